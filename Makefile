@@ -1,0 +1,29 @@
+# The front door: each target is thin over a CMake preset. `make help` lists them.
+PRESET ?= release
+RUN_WORLDS ?= 4
+.DEFAULT_GOAL := help
+.PHONY: help setup configure build run test test-all test-asan test-tsan format
+
+help:            ## list the targets
+	@grep -hE '^[a-z-]+: .*##' $(MAKEFILE_LIST) | sed 's/: .*##/\t/' | expand -t 12
+
+setup:           ## install the Debian packages that are missing (says which)
+	@scripts/setup.sh
+
+configure: setup ## configure build/$(PRESET)
+	@cmake --preset $(PRESET) --log-level=WARNING
+
+build: configure ## build into build/$(PRESET), programs in build/$(PRESET)/bin
+	@cmake --build --preset $(PRESET)
+
+run: build       ## the demo: a small city on 4 world daemons
+	@scripts/demo.sh build/$(PRESET)/bin $(RUN_WORLDS)
+
+test: build      ## unit, simulation and distributed tests, and the sanitizers' sample (what CI runs)
+	@scripts/test.sh sample
+
+test-all: build  ## every test, whole matrices
+	@scripts/test.sh all
+
+format:          ## clang-format over our sources
+	@git ls-files '*.h' '*.cpp' | xargs clang-format -i

@@ -1,0 +1,30 @@
+// How a process of a session reaches the others: options that `soda` and `soda-world` share.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace soda::dds {
+
+struct NetworkOptions {
+  // "local": this machine only (UDP on 127.0.0.1); "all": every interface; else the IPv4 address of the one to use.
+  std::string interface = "local";
+  bool shared_memory = true;     // between processes of one machine
+  std::string discovery_server;  // HOST:PORT of a fast-discovery-server with id 0; "": simple discovery
+  std::uint32_t domain = 0;      // DDS domain
+  // s. A process that was silent for longer is taken for gone and must be discovered again. Well above the longest pause
+  // expected; a dead world is noticed faster by its status writer's own lease (topics.h).
+  double lease = 10;
+};
+
+void add_network_options(CLI::App& app, NetworkOptions& options);
+
+// The same options as arguments, for starting another process.
+std::vector<std::string> arguments(const NetworkOptions& options);
+
+}  // namespace soda::dds

@@ -1,0 +1,70 @@
+#include "common/dds/topics.h"
+
+#include "common/dds/checks.h"
+
+namespace soda::dds {
+namespace {
+
+constexpr int kManyWorlds = static_cast<int>(kMaxWorlds);
+
+// The newest sample of each instance, for whoever comes.
+Flow newest(int instances) {
+  Flow flow;
+  flow.keep_last = 1;
+  flow.max_instances = instances;
+  flow.max_samples = instances;
+  return flow;
+}
+
+// Every sample, in order; a write waits when the history is full of samples that were not acknowledged.
+Flow all(int max_samples, Millis write_at_most) {
+  Flow flow;
+  flow.max_samples = max_samples;
+  flow.write_at_most = write_at_most;
+  return flow;
+}
+
+}  // namespace
+
+Topic session_topic() { return {"soda/session", newest(1)}; }
+
+// Holds the whole scene, for worlds that join late: as many chunks as the largest scene has.
+Topic scene_topic() {
+  return {"soda/scene", all(static_cast<int>(kMaxSceneBytes / kMaxChunkBytes) + 1, Millis(1000))};
+}
+
+Topic join_topic() { return {"soda/join", newest(kManyWorlds)}; }
+
+Topic admission_topic() { return {"soda/admission", newest(kManyWorlds)}; }
+
+Topic control_topic() { return {"soda/control", newest(1)}; }
+
+// The lease is what tells of a dead or stopped world, long before its participant's lease does.
+Topic status_topic() {
+  Topic topic{"soda/status", newest(kManyWorlds)};
+  topic.flow.liveliness_lease = Millis(1000);
+  return topic;
+}
+
+// Two minutes of history at 20 samples a second for those who come late; afterwards the oldest acknowledged go.
+Topic digests_topic() { return {"soda/digests", all(2400, Millis(1000))}; }
+
+// At most 16 MiB in flight.
+Topic states_topic() { return {"soda/states", all(32, Millis(1000))}; }
+
+// A slow viewer misses steps; nobody waits for it.
+Topic transforms_topic() {
+  Topic topic{"soda/transforms", newest(kManyWorlds)};
+  topic.flow.keep_last = 8;
+  topic.flow.max_samples = 8 * kManyWorlds;
+  return topic;
+}
+
+// The core keeps what was not acknowledged by the neighbour's core and sends it again when asked, so that this history
+// only has to hold what is under way. A write must not hold up the loop, which then treats the connection as interrupted.
+// TRANSIENT_LOCAL: VOLATILE writers of Fast DDS 2.9 drop a sample when a full history drains.
+Topic border_topic(WorldId from, WorldId to) {
+  return {"soda/border/" + std::to_string(from) + "/" + std::to_string(to), all(64, Millis(10))};
+}
+
+}  // namespace soda::dds

@@ -1,0 +1,47 @@
+// All topics of a session and how their samples flow: the one place where QoS is chosen. docs/topics.md is the table for
+// readers. A session is a partition named after it; all topics of this file live in it.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "common/ids.h"
+
+namespace soda::dds {
+
+using Millis = std::chrono::milliseconds;
+
+struct Flow {
+  bool reliable = true;
+  bool late_joiners = true;    // TRANSIENT_LOCAL: who comes later gets what the writer still has
+  int keep_last = 0;           // samples per instance; 0: all, up to max_samples
+  int max_samples = 0;         // in a writer's or reader's history, over all instances
+  int max_instances = 1;
+  Millis write_at_most{100};   // a write that cannot be done waits at most that long, then fails
+  Millis liveliness_lease{0};  // a writer silent for that long is reported; 0: never
+};
+
+struct Topic {
+  std::string name;
+  Flow flow;
+};
+
+Topic session_topic();      // Session
+Topic scene_topic();        // SceneChunk
+Topic join_topic();         // Join
+Topic admission_topic();    // Admission
+Topic control_topic();      // Control
+Topic status_topic();       // Status
+Topic digests_topic();      // Digests
+Topic states_topic();       // StateChunk
+Topic transforms_topic();   // Transforms
+Topic border_topic(WorldId from, WorldId to);  // Border
+
+// Reliable writers tell readers what there is this often while it is not acknowledged. 3 s by default: a reader that lost
+// something would take that long to find out.
+constexpr Millis kHeartbeat{50};
+// Answers to heartbeats and to requests for lost samples are not delayed further (5 ms by default).
+constexpr Millis kAnswerDelay{1};
+
+}  // namespace soda::dds

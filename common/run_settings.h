@@ -1,0 +1,25 @@
+// Words in which a run is described on command lines, for `soda` and `soda-world` alike. All throw std::invalid_argument
+// with a message for people.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/ids.h"
+
+namespace soda {
+
+constexpr Step kDefaultSteps = 600;   // 10 s at 60 Hz
+constexpr Step kDefaultWindow = 48;   // K: steps that a clock may be ahead of the displayed one, as in the paper
+
+// "realtime": 1; "max": 0 (as fast as possible); else a multiple of real time.
+double parse_pace(const std::string& text);
+
+// "A" or "A:B", 0 <= A <= B.
+std::pair<Step, Step> parse_steps(const std::string& text);
+
+// "0,2,5", "0-3", "none": worlds, ascending.
+std::vector<WorldId> parse_worlds(const std::string& text);
+
+}  // namespace soda

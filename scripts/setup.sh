@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Installs the Debian 12 packages that SODA is built from and that are missing here, and says which.
+# Does nothing when all are there. Needs root or sudo only when something is missing.
+set -euo pipefail
+
+packages=(
+  build-essential cmake ninja-build pkg-config ccache git   # build
+  libbullet-dev libeigen3-dev                               # physics: shapes and narrow phase; vectors
+  libfastrtps-dev libfastcdr-dev fastddsgen                 # Fast DDS and its IDL compiler
+  libprotobuf-dev protobuf-compiler                         # scene files
+  libsdformat-dev libassimp-dev                             # SDF worlds and meshes
+  libspdlog-dev libcli11-dev libxxhash-dev libzstd-dev      # logs, options, hashes, compression
+  libgtest-dev libbenchmark-dev                             # tests and micro-benchmarks
+  gnuplot-nox                                               # pictures
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+
+echo "SODA needs these Debian packages, which are not installed here:"
+printf '  %s\n' "${missing[@]}"
+sudo=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "error: neither root nor sudo; install them yourself:  apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  sudo=(sudo)
+fi
+echo "installing them (apt-get install) ..."
+export DEBIAN_FRONTEND=noninteractive
+"${sudo[@]}" apt-get update -qq
+"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+echo "done."

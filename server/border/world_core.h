@@ -1,0 +1,107 @@
+// One world of a session as a pure protocol machine: bodies and messages in, bodies and messages out. It knows neither
+// clocks nor networks and never blocks, so that the same code runs over DDS, in one process under a simulated network,
+// and alone as the reference (one world, no neighbours).
+//
+// This is the conservative mode: nothing is assumed about a neighbour; step t is computed once every neighbour's stream
+// has reached t. docs/architecture.md tells the protocol as a whole.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/body_set.h"
+#include "common/ids.h"
+#include "common/territory.h"
+#include "server/physics/model.h"
+
+namespace soda::border {
+
+struct CoreSettings {
+  WorldId me = 0;
+  std::uint32_t epoch = 0;  // of this start of the world
+  Step last_step = 0;       // the run ends when this step is final
+};
+
+struct CoreStats {
+  std::uint64_t steps = 0;           // steps computed
+  std::uint64_t syncs = 0;           // steps for which island parts were exchanged
+  std::uint64_t mixed_islands = 0;   // islands solved together with other worlds, summed over steps
+  std::uint64_t arrived = 0;         // bodies that came into the territory
+  std::uint64_t departed = 0;        // bodies that left it
+  std::uint64_t wide_bodies = 0;     // bodies sent as wide, summed over steps
+  std::uint64_t messages_sent = 0, bytes_sent = 0;
+  std::uint64_t frames_sent = 0, frame_bodies_sent = 0;  // frames that held bodies, and how many
+  std::uint64_t parts_sent = 0;      // own parts and parts passed on
+  std::uint64_t messages_resent = 0;
+  std::uint64_t duplicates = 0;      // messages received again, ignored
+  std::uint64_t refused = 0;         // malformed or foreign messages, and protocol errors
+  std::uint64_t clamped = 0;         // bodies slowed to the scene's largest speed, summed over steps
+  std::uint64_t non_finite = 0;      // bodies whose result was not finite and which were held, summed over steps
+  double solve_seconds = 0;          // unused by the core; the daemon fills its own times in
+};
+
+// Told what a world computes. All calls come from within WorldCore::work or receive, on the caller's thread.
+class Observer {
+ public:
+  virtual ~Observer() = default;
+  // State `step` of the bodies that this world produced there (see "producer" in docs/architecture.md), contact records
+  // included. Called once for state 0 (with the world's own bodies) and once for each step computed.
+  virtual void computed(Step /*step*/, const BodySet& /*produced*/) {}
+  // The same state has become final: called once for each step from 0 on, in order. `hash` is bodies_hash(produced).
+  virtual void finalised(Step /*step*/, const BodySet& /*produced*/, std::uint64_t /*hash*/) {}
+};
+
+struct Outgoing {
+  WorldId to = 0;
+  std::vector<std::byte> bytes;
+};
+
+enum class Progress {
+  kWorked,   // something was done; call again
+  kWaiting,  // nothing to do until a message comes
+  kAtLimit,  // the clock is at the limit set by set_limit
+  kDone,     // last_step is final here, and every neighbour has said the same
+};
+
+class WorldCore {
+ public:
+  // `model`, `map` and `observer` must outlive the core. The bodies of state 0 are the scene's whose centres of mass lie
+  // in this world's territory.
+  WorldCore(const physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer);
+  ~WorldCore();
+
+  // ---- in
+  // A message as it came, from whichever neighbour, in any order, any number of times. False: it was refused (malformed,
+  // not for this world or epoch, or contrary to the protocol); last_refusal() says why, and nothing has changed.
+  bool receive(std::span<const std::byte> message);
+  const std::string& last_refusal() const;
+  // The connection with that neighbour was interrupted, or nothing has come for long: asks it for what is missing here
+  // and sends again what it has not acknowledged. Harmless at any time.
+  void reconnect(WorldId neighbour);
+  // The clock does not pass this step (pacing). By default there is no limit.
+  void set_limit(Step newest);
+
+  // ---- work: at most one step's worth, then returns
+  Progress work();
+
+  // ---- out: what has become ready to send since the last call, in order for each neighbour
+  std::vector<Outgoing> take_outgoing();
+
+  Step clock() const;       // newest step computed
+  Step final_step() const;  // newest step that can never change
+  const std::vector<WorldId>& neighbours() const;
+  std::vector<WorldId> waiting_for() const;  // neighbours whose messages the next piece of work lacks
+  std::size_t own_bodies() const;            // bodies whose centre lies in the territory at the clock
+  std::size_t own_cells() const;
+  const CoreStats& stats() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace soda::border

@@ -1,0 +1,137 @@
+#include "server/physics/integrator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/physics/tuning.h"
+
+namespace soda::physics {
+
+StepConstants::StepConstants(const Scene& scene)
+    : dt(scene.dt),
+      substeps(scene.substeps),
+      h(scene.dt / scene.substeps),
+      gravity(scene.gravity),
+      up(scene.gravity.isZero(0) ? Vec3(Vec3::Zero()) : Vec3(-scene.gravity / scene.gravity.norm())),
+      max_speed(scene.max_speed),
+      sleeping(scene.sleeping),
+      quiet_steps_to_sleep(static_cast<std::uint32_t>(std::ceil(kSleepTime / scene.dt))) {}
+
+namespace {
+
+// The drive's target with the axes turned round that the state says, and those that the bounds now ask for.
+Vec3 drive_target(const Drive& drive, const Vec3& x, std::uint32_t& flags) {
+  Vec3 target = drive.velocity;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::uint32_t bit = kDriveReversed << axis;
+    double t = flags & bit ? -target[axis] : target[axis];
+    if (drive.bounds && ((x[axis] > drive.bounds->max[axis] && t > 0) || (x[axis] < drive.bounds->min[axis] && t < 0))) {
+      flags ^= bit;
+      t = -t;
+    }
+    target[axis] = t;
+  }
+  return target;
+}
+
+void limit_speed(MovingBody& body, double max_speed) {
+  const double square = body.v.squaredNorm();
+  if (square <= max_speed * max_speed) return;
+  body.v *= max_speed / std::sqrt(square);
+  body.clamped = true;
+}
+
+}  // namespace
+
+void begin_step(const BodyState& state, const BodyModel& model, MovingBody& body) {
+  body.v = state.v();
+  body.w = state.w();
+  body.moved = body.turned = Vec3::Zero();
+  body.x = state.x();
+  body.q = state.q();
+  body.rotation = body.q.toRotationMatrix();
+  body.inverse_mass = model.inverse_mass;
+  if (model.isotropic)
+    body.inverse_inertia = model.inverse_inertia;
+  else
+    body.inverse_inertia = body.rotation * model.inverse_inertia * body.rotation.transpose();
+  body.model = &model;
+  body.clamped = false;
+  if (model.drive) {
+    std::uint32_t flags = state.flags;
+    body.drive_target = drive_target(*model.drive, body.x, flags);
+  }
+}
+
+void accelerate(MovingBody& body, double h, const StepConstants& constants) {
+  const BodyModel& model = *body.model;
+  body.v += h * constants.gravity;
+  if (model.drive) {
+    Vec3 wanted = body.drive_target - body.v;
+    wanted -= constants.up.dot(wanted) * constants.up;
+    const double most = model.drive->max_acceleration * h, length = wanted.norm();
+    body.v += length > most ? Vec3(wanted * (most / length)) : wanted;
+  }
+  // Implicit: v' = v - h c v'
+  if (model.linear_damping > 0) body.v *= 1 / (1 + h * model.linear_damping);
+  if (model.angular_damping > 0) body.w *= 1 / (1 + h * model.angular_damping);
+}
+
+void move(MovingBody& body, double h, const StepConstants& constants) {
+  limit_speed(body, constants.max_speed);
+  body.moved += h * body.v;
+  const Vec3 turn = h * body.w;
+  body.turned += turn;
+  const bool gyroscopic = !body.model->isotropic && turn.squaredNorm() > kGyroscopicAngle * kGyroscopicAngle;
+  if (!gyroscopic) {
+    body.q = normalized(rotation_of(turn) * body.q);
+    return;
+  }
+  // Angular momentum is kept in the world frame: w' = I(q')^-1 I(q) w.
+  const Mat3& inertia = body.model->inertia;
+  const Vec3 momentum_local = inertia * (body.q.conjugate() * body.w);
+  const Vec3 momentum = body.q * momentum_local;
+  body.q = normalized(rotation_of(turn) * body.q);
+  body.w = body.q * (body.model->inverse_inertia * (body.q.conjugate() * momentum));
+}
+
+void fly(MovingBody& body, const StepConstants& constants) {
+  const Vec3 before = body.v;
+  accelerate(body, constants.dt, constants);
+  limit_speed(body, constants.max_speed);
+  // The mean of both velocities is exact under constant acceleration.
+  body.moved = (0.5 * constants.dt) * (before + body.v);
+  const Vec3 after = body.v;
+  body.v = Vec3::Zero();  // `move` is for the rotation alone here
+  const Vec3 moved = body.moved;
+  if (body.model->isotropic)
+    move(body, constants.dt, constants);
+  else
+    for (std::uint32_t i = 0; i < constants.substeps; ++i) move(body, constants.h, constants);
+  body.v = after;
+  body.moved = moved;
+}
+
+bool end_step(const MovingBody& body, const StepConstants& constants, BodyState& state) {
+  if (body.model->drive) (void)drive_target(*body.model->drive, body.x, state.flags);
+  state.flags &= ~std::uint32_t{kAsleep};
+  const Vec3 x = body.x + body.moved;
+  const double sum = x.sum() + body.v.sum() + body.w.sum() + body.q.coeffs().sum();
+  if (!std::isfinite(sum)) {
+    state.set_v(Vec3::Zero());
+    state.set_w(Vec3::Zero());
+    state.quiet_steps = 0;
+    return false;
+  }
+  state.set_x(x);
+  state.set_q(body.q);
+  state.set_v(body.v);
+  state.set_w(body.w);
+  const double r = body.model->radius;
+  const bool quiet = body.v.squaredNorm() < kSleepSpeed * kSleepSpeed &&
+                     body.w.squaredNorm() * r * r < kSleepSpeed * kSleepSpeed && !body.model->drive;
+  state.quiet_steps = quiet ? std::min(state.quiet_steps + 1, constants.quiet_steps_to_sleep) : 0;
+  return true;
+}
+
+}  // namespace soda::physics

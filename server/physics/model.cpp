@@ -1,0 +1,110 @@
+#include "server/physics/model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/grid.h"
+
+namespace soda::physics {
+namespace {
+
+// Ids up to this many times the number of bodies are looked up in a table, else by bisection.
+constexpr std::size_t kTableFactor = 8;
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+// Half edge of the box that stands for a plane: beyond everything that is in the scene at the start.
+double plane_extent_of(const Scene& scene) {
+  double extent = 1000;
+  for (const Body& body : scene.bodies) extent = std::max(extent, 2 * body.pose.position.cwiseAbs().maxCoeff());
+  return extent;
+}
+
+bool is_isotropic(const Mat3& inertia) {
+  const double scale = inertia(0, 0);
+  return (inertia - scale * Mat3::Identity()).cwiseAbs().maxCoeff() <= 1e-12 * std::abs(scale);
+}
+
+template <typename T>
+const T* find_by_id(const std::vector<T>& sorted, BodyId id) {
+  const auto it = std::lower_bound(sorted.begin(), sorted.end(), id, [](const T& t, BodyId i) { return t.id < i; });
+  return it != sorted.end() && it->id == id ? &*it : nullptr;
+}
+
+}  // namespace
+
+Model::Model(Scene scene) : scene_(std::move(scene)) {
+  std::sort(scene_.bodies.begin(), scene_.bodies.end(), [](const Body& l, const Body& r) { return l.id < r.id; });
+  const double plane_extent = plane_extent_of(scene_);
+  std::vector<double> radii;
+  for (const Body& body : scene_.bodies) {
+    const auto children = static_cast<std::uint32_t>(body.shapes.size());
+    const std::uint32_t first = shapes_.add(scene_, body, plane_extent);
+    if (body.is_static) {
+      StaticModel s;
+      s.id = body.id;
+      s.pose = {body.pose.position, normalized(body.pose.orientation)};
+      s.rotation = s.pose.orientation.toRotationMatrix();
+      s.friction = body.friction;
+      s.restitution = body.restitution;
+      s.first_child = first;
+      s.children = children;
+      s.box = bounding_box(shapes_.children(first, children), s.pose.position, s.rotation);
+      statics_.push_back(s);
+      continue;
+    }
+    BodyModel m;
+    m.id = body.id;
+    m.mass = body.inertial.mass;
+    m.inverse_mass = 1 / m.mass;
+    m.inertia = body.inertial.inertia;
+    m.inverse_inertia = m.inertia.inverse();
+    m.isotropic = is_isotropic(m.inertia);
+    m.friction = body.friction;
+    m.restitution = body.restitution;
+    m.linear_damping = body.linear_damping;
+    m.angular_damping = body.angular_damping;
+    m.first_child = first;
+    m.children = children;
+    m.radius = bounding_radius(scene_, body);
+    m.inner_extent = m.radius;
+    for (const Child& child : shapes_.children(first, children))
+      m.inner_extent = std::min(m.inner_extent, child.inner_extent);
+    m.drive = body.drive ? &*body.drive : nullptr;
+    radii.push_back(m.radius);
+    bodies_.push_back(m);
+  }
+  if (radii.empty()) return;
+  diameter_ = 2 * largest_ordinary_radius(radii);
+  const BodyId last = bodies_.back().id;
+  if (last / kTableFactor <= bodies_.size()) {
+    index_.assign(last + 1, kNone);
+    for (std::uint32_t i = 0; i < bodies_.size(); ++i) index_[bodies_[i].id] = i;
+  }
+}
+
+const BodyModel* Model::find(BodyId id) const {
+  if (index_.empty()) return find_by_id(bodies_, id);
+  if (id >= index_.size() || index_[id] == kNone) return nullptr;
+  return &bodies_[index_[id]];
+}
+
+const StaticModel* Model::find_static(BodyId id) const { return find_by_id(statics_, id); }
+
+BodySet Model::initial_state() const {
+  BodySet set;
+  set.bodies.reserve(bodies_.size());
+  for (const Body& body : scene_.bodies) {
+    if (body.is_static) continue;
+    BodyState s;
+    s.id = body.id;
+    const Quat q = normalized(body.pose.orientation);
+    s.set_x(body.pose.position + q * body.inertial.centre);
+    s.set_q(q);
+    s.set_v(body.linear_velocity);
+    s.set_w(body.angular_velocity);
+    set.bodies.push_back(s);
+  }
+  return set;
+}
+
+}  // namespace soda::physics

@@ -1,0 +1,258 @@
+#include "server/physics/stepper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include "server/physics/tuning.h"
+
+namespace soda::physics {
+namespace {
+
+double cpu_seconds() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+class StageClock {
+ public:
+  explicit StageClock(bool on) : on_(on), last_(on ? cpu_seconds() : 0) {}
+  void lap(double& sum) {
+    if (!on_) return;
+    const double now = cpu_seconds();
+    sum += now - last_;
+    last_ = now;
+  }
+
+ private:
+  bool on_;
+  double last_;
+};
+
+std::vector<Aabb> static_boxes(const Model& model) {
+  std::vector<Aabb> boxes;
+  for (const StaticModel& s : model.statics()) boxes.push_back(s.box);
+  return boxes;
+}
+
+// Broad-phase cells hold an ordinary body's reach box at moderate speed.
+double broad_cell(const Model& model) { return 1.1 * model.largest_ordinary_diameter() + 4 * kContactMargin; }
+
+}  // namespace
+
+Aabb reach_box(const BodyState& state, const BodyModel& model, const Mat3& rotation, const Model& scene) {
+  Aabb box = bounding_box(scene.shapes().children(model.first_child, model.children), state.x(), rotation);
+  double grow = kContactMargin;
+  if (!state.asleep()) {
+    const Vec3 travel = scene.scene().dt * state.v();
+    box.min += travel.cwiseMin(0.0);
+    box.max += travel.cwiseMax(0.0);
+    // Turning: no point moves further than this, nor further out than the radius.
+    grow += std::min(state.w().norm() * scene.scene().dt, 1.0) * model.radius;
+  }
+  box.min.array() -= grow;
+  box.max.array() += grow;
+  return box;
+}
+
+Aabb reach_box(const BodyState& state, const Model& scene) {
+  return reach_box(state, *scene.find(state.id), state.q().toRotationMatrix(), scene);
+}
+
+Stepper::Stepper(const Model& model)
+    : model_(model),
+      constants_(model.scene()),
+      statics_(static_boxes(model), broad_cell(model)),
+      order_(kBlockDiameters * model.largest_ordinary_diameter()),
+      solver_(constants_),
+      slots_(model.bodies().size(), kStaticSlot) {}
+
+std::uint32_t Stepper::slot_of(BodyId id) const {
+  const BodyModel* m = model_.find(id);
+  return m ? slots_[static_cast<std::size_t>(m - model_.bodies().data())] : kStaticSlot;
+}
+
+Party Stepper::party(const BodyState& state, std::uint32_t slot) const {
+  const BodyModel& m = *models_[slot];
+  return {state.id, state.x(), state.q(), rotations_[slot], model_.shapes().children(m.first_child, m.children),
+          m.inner_extent};
+}
+
+Party Stepper::party(const StaticModel& fixed) const {
+  // Only the dynamic body's size limits how long contacts are recycled.
+  return {kStaticBit | fixed.id, fixed.pose.position, fixed.pose.orientation, fixed.rotation,
+          model_.shapes().children(fixed.first_child, fixed.children), std::numeric_limits<double>::infinity()};
+}
+
+void Stepper::place_bodies(const BodySet& set, std::span<const std::uint8_t> roles) {
+  const std::size_t n = set.bodies.size();
+  models_.resize(n);
+  rotations_.resize(n);
+  boxes_.resize(n);
+  roles_.resize(n);
+  record_offsets_.assign(n + 1, 0);
+  std::fill(slots_.begin(), slots_.end(), kStaticSlot);
+  std::size_t record = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const BodyState& state = set.bodies[i];
+    models_[i] = model_.find(state.id);
+    if (!models_[i]) throw std::invalid_argument("step: body " + std::to_string(state.id) + " is not in the scene");
+    slots_[static_cast<std::size_t>(models_[i] - model_.bodies().data())] = static_cast<std::uint32_t>(i);
+    rotations_[i] = state.q().toRotationMatrix();
+    boxes_[i] = reach_box(state, *models_[i], rotations_[i], model_);
+    roles_[i] = roles.empty() ? std::uint8_t{kRoleWanted} : roles[i];
+    if (!state.asleep()) roles_[i] |= kRoleAwake;
+    while (record < set.contacts.size() && set.contacts[record].a == state.id) ++record;
+    record_offsets_[i + 1] = static_cast<std::uint32_t>(record);
+  }
+}
+
+void Stepper::find_contacts(const BodySet& set, std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out) {
+  out.clear();
+  StageClock clock(timing);
+  place_bodies(set, roles);
+  clock.lap(times.boxes);
+  broad_.find(boxes_, roles_, broad_cell(model_), pairs_);
+  clock.lap(times.broad);
+  for (std::uint32_t i = 0; i < set.bodies.size(); ++i) contacts_of(set, i, out);
+  clock.lap(times.narrow);
+}
+
+void Stepper::contacts_of(const BodySet& set, std::uint32_t body, std::vector<ContactRecord>& out) {
+  const BodyState& state = set.bodies[body];
+  const auto previous =
+      std::span(set.contacts).subspan(record_offsets_[body], record_offsets_[body + 1] - record_offsets_[body]);
+  const bool wanted = (roles_[body] & kRoleWanted) != 0;
+  std::size_t next = 0;
+  // Between two sleeping bodies nothing changes: their records stay as they are.
+  const auto keep_sleeping_until = [&](BodyId end) {
+    for (; next < previous.size() && previous[next].b < end; ++next) {
+      if (!state.asleep()) continue;
+      const std::uint32_t partner = slot_of(previous[next].b);
+      if (partner == kStaticSlot || !set.bodies[partner].asleep()) continue;
+      if (wanted || (roles_[partner] & kRoleWanted) || (roles_[body] & roles_[partner] & kRoleWide))
+        out.push_back(previous[next]);
+    }
+  };
+  const auto records_with = [&](BodyId partner) {
+    while (next < previous.size() && previous[next].b < partner) ++next;
+    const std::size_t first = next;
+    while (next < previous.size() && previous[next].b == partner) ++next;
+    return previous.subspan(first, next - first);
+  };
+  const Party self = party(state, body);
+  const double own_reach = state.w().norm() * models_[body]->radius;
+  for (const std::uint32_t partner : pairs_.of(body)) {
+    const BodyState& other = set.bodies[partner];
+    keep_sleeping_until(other.id);
+    const double approach =
+        (state.v() - other.v()).norm() + own_reach + other.w().norm() * models_[partner]->radius;
+    updater_.update(self, party(other, partner), records_with(other.id),
+                    kSpeculativeDistance + approach * constants_.dt, out);
+  }
+  keep_sleeping_until(kStaticBit);
+  if (!wanted) return;
+  if (state.asleep()) {
+    out.insert(out.end(), previous.begin() + static_cast<std::ptrdiff_t>(next), previous.end());
+    return;
+  }
+  statics_.find(boxes_[body], near_statics_);
+  const double reach = kSpeculativeDistance + (state.v().norm() + own_reach) * constants_.dt;
+  for (const std::uint32_t s : near_statics_) {
+    const StaticModel& fixed = model_.statics()[s];
+    updater_.update(self, party(fixed), records_with(kStaticBit | fixed.id), reach, out);
+  }
+}
+
+void Stepper::find_islands(std::span<const BodyState> bodies, std::span<const ContactRecord> contacts,
+                           std::vector<Ends>& ends, Islands& islands) {
+  StageClock clock(timing);
+  std::fill(slots_.begin(), slots_.end(), kStaticSlot);
+  for (std::uint32_t i = 0; i < bodies.size(); ++i)
+    slots_[static_cast<std::size_t>(model_.find(bodies[i].id) - model_.bodies().data())] = i;
+  ends.resize(contacts.size());
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    ends[k].a = slot_of(contacts[k].a);
+    ends[k].b = contacts[k].with_static() ? kStaticSlot : slot_of(contacts[k].b);
+    if (ends[k].a == kStaticSlot || (ends[k].b == kStaticSlot && !contacts[k].with_static()))
+      throw std::invalid_argument("step: a contact record names a body that is not in the set");
+  }
+  finder_.find(bodies.size(), ends, islands);
+  clock.lap(times.islands);
+}
+
+void Stepper::solve(std::span<BodyState> bodies, std::span<ContactRecord> contacts, std::span<const Ends> ends,
+                    const Islands& islands, std::span<const std::uint32_t> which) {
+  StageClock clock(timing);
+  centres_.resize(bodies.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) centres_[i] = bodies[i].x();
+  surfaces_.resize(contacts.size());
+  island_slot_.resize(bodies.size());
+  for (const std::uint32_t island : which) {
+    const auto members = islands.bodies_of(island);
+    if (std::all_of(members.begin(), members.end(), [&](std::uint32_t i) { return bodies[i].asleep(); })) continue;
+    const auto touching = islands.contacts_of(island);
+    moving_.resize(members.size());
+    for (std::uint32_t k = 0; k < members.size(); ++k) {
+      island_slot_[members[k]] = k;
+      BodyState& state = bodies[members[k]];
+      if (state.asleep()) state.quiet_steps = 0;  // woken: has to come to rest anew
+      begin_step(state, *model_.find(state.id), moving_[k]);
+    }
+    if (touching.empty()) {
+      fly(moving_[0], constants_);
+    } else {
+      for (const std::uint32_t c : touching) {
+        const BodyModel& a = *moving_[island_slot_[ends[c].a]].model;
+        Surface& surface = surfaces_[c];
+        double friction, restitution;
+        if (ends[c].b == kStaticSlot) {
+          surface.fixed = model_.find_static(contacts[c].b & ~kStaticBit);
+          friction = surface.fixed->friction, restitution = surface.fixed->restitution;
+        } else {
+          const BodyModel& b = *moving_[island_slot_[ends[c].b]].model;
+          surface.fixed = nullptr;
+          friction = b.friction, restitution = b.restitution;
+        }
+        surface.friction = std::sqrt(a.friction * friction);
+        surface.restitution = std::max(a.restitution, restitution);
+      }
+      sorted_.assign(touching.begin(), touching.end());
+      order_.sort(sorted_, ends, centres_);
+      clock.lap(times.order);
+      solver_.solve(moving_, island_slot_, sorted_, ends, surfaces_, contacts);
+      ++counters.islands;
+    }
+    bool quiet = constants_.sleeping;
+    for (std::uint32_t k = 0; k < members.size(); ++k) {
+      BodyState& state = bodies[members[k]];
+      if (!end_step(moving_[k], constants_, state)) ++counters.non_finite;
+      counters.clamped += moving_[k].clamped;
+      quiet = quiet && state.quiet_steps >= constants_.quiet_steps_to_sleep;
+    }
+    if (quiet) {
+      ++counters.fell_asleep;
+      for (const std::uint32_t i : members) {
+        bodies[i].flags |= kAsleep;
+        bodies[i].set_v(Vec3::Zero());
+        bodies[i].set_w(Vec3::Zero());
+      }
+    }
+    clock.lap(times.solve);
+  }
+}
+
+void Stepper::step(BodySet& set) {
+  find_contacts(set, {}, found_);
+  set.contacts.swap(found_);
+  find_islands(set.bodies, set.contacts, ends_, islands_);
+  all_.resize(islands_.size());
+  std::iota(all_.begin(), all_.end(), 0u);
+  solve(set.bodies, set.contacts, ends_, islands_, all_);
+}
+
+}  // namespace soda::physics

@@ -1,0 +1,39 @@
+// Every number of the step that could have been another, with its unit and its reason.
+#pragma once
+
+namespace soda::physics {
+
+// ---- contact finding
+constexpr double kContactMargin = 0.01;  // m; a body's reach box is wider than the body by this on each side
+// m; two bodies closer than this plus what they can approach within the step get contact points before they touch, so
+// that nothing tunnels and resting contacts do not flicker.
+constexpr double kSpeculativeDistance = 0.02;
+constexpr double kMatchDistance = 0.02;  // m; a point found this near to an old one takes over its impulse
+
+// ---- contact recycling: old anchors are kept while the pair has moved less than this since they were detected. Frozen
+// anchors are what keeps tall stacks from creeping, and save most detections in resting scenes.
+constexpr double kRecycleDistance = 0.05;       // m, relative translation, at most
+constexpr double kRecycleExtentShare = 0.2;     // and at most this share of the smaller half extent of the two
+constexpr double kRecycleCosine = 0.99619469809174555;  // cos(5 deg): neither body has turned by more than 10 deg
+
+// ---- soft contacts (Catto, "Solver2D", 2024: soft constraints with sub-steps)
+constexpr double kContactHertzPerSubstepRate = 0.125;  // contact frequency as a share of the sub-step rate
+constexpr double kContactHertzCap = 1000;              // Hz
+constexpr double kContactDampingRatio = 10;
+constexpr double kStaticHertzFactor = 2;     // contacts with static bodies are stiffer ...
+constexpr double kStaticDampingFactor = 0.5;  // ... and less damped
+constexpr double kPushOutSpeed = 3;           // m/s, limit for removing penetration
+constexpr double kRestitutionThreshold = 1;   // m/s; slower approaches do not bounce
+
+// ---- integration
+constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning of anisotropic bodies is treated as free of torque terms
+
+// ---- sleeping
+constexpr double kSleepSpeed = 0.05;  // m/s, of the centre of mass, and of the fastest point about it
+constexpr double kSleepTime = 0.5;    // s below that speed until an island may sleep
+
+// ---- canonical order of constraints: four grids of blocks, each shifted against the one before
+constexpr double kBlockDiameters = 8;  // edge of a block in largest ordinary diameters
+constexpr int kBlockGrids = 4;
+
+}  // namespace soda::physics

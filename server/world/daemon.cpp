@@ -1,0 +1,226 @@
+#include "server/world/daemon.h"
+
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "common/grid.h"
+
+namespace soda::world {
+namespace {
+
+using namespace std::chrono_literals;
+using border::Progress;
+
+constexpr auto kStatusEvery = 200ms;
+constexpr auto kStatusAtMost = 5ms;      // while a paced session waits for news of progress
+constexpr auto kIdle = 20ms;             // longest sleep: reports and signals are looked after in between
+// A neighbour that is waited for and silent for that long is asked again what it has; then half as often each time, because
+// it may just be at a long step, and would be sent the same things again and again.
+constexpr auto kPatience = 500ms;
+constexpr auto kPatienceMost = 4000ms;
+constexpr auto kFlushAtMost = 5s;        // for neighbours that have left already
+constexpr auto kFinishAtMost = 10s;
+
+double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
+double seconds(const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); }
+
+std::string host_name() {
+  char name[256] = {};
+  if (gethostname(name, sizeof name - 1) != 0) return "?";
+  return name;
+}
+
+}  // namespace
+
+Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport, Reports& reports)
+    : settings_(settings),
+      transport_(transport),
+      reports_(reports),
+      model_(std::move(scene)),
+      map_(bisect(model_.scene(), make_grid(model_.scene()), settings.worlds)),
+      recorder_(settings.instance, settings.me, model_.scene().dt, settings.dump_first, settings.dump_last, reports) {
+  border::CoreSettings core;
+  core.me = settings.me;
+  core.epoch = settings.epoch;
+  core.last_step = settings.last_step;
+  core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
+  core_->set_limit(0);
+  lines_.resize(core_->neighbours().size());
+  transport_.open(core_->neighbours());
+}
+
+void Daemon::set_limit(Step newest) {
+  Step known = limit_.load();
+  while (known < newest && !limit_.compare_exchange_weak(known, newest)) {
+  }
+  transport_.wake();
+}
+
+void Daemon::release() {
+  released_.store(true);
+  transport_.wake();
+}
+
+void Daemon::stop() {
+  stopped_.store(true);
+  transport_.wake();
+}
+
+Daemon::Line& Daemon::line(WorldId neighbour) {
+  const auto& all = core_->neighbours();
+  const auto at = std::find(all.begin(), all.end(), neighbour) - all.begin();
+  return lines_.at(static_cast<std::size_t>(at));
+}
+
+bool Daemon::receive_all() {
+  bool any = false;
+  while (auto incoming = transport_.receive()) {
+    any = true;
+    if (incoming->kind == Incoming::Kind::kInterrupted) {
+      ++interruptions_;
+      spdlog::info("the connection with world {} was interrupted; taking it up again", incoming->from);
+      core_->reconnect(incoming->from);
+    } else if (!core_->receive(incoming->bytes)) {
+      ++refusals_;
+      if (refusals_ <= 8 || std::has_single_bit(refusals_))
+        spdlog::warn("refused a message of {} bytes from world {}: {} (refusal {})", incoming->bytes.size(),
+                     incoming->from, core_->last_refusal(), refusals_);
+    } else {
+      Line& from = line(incoming->from);
+      from.heard = Clock::now();
+      from.patience = kPatience;
+    }
+  }
+  return any;
+}
+
+void Daemon::send_all() {
+  for (border::Outgoing& message : core_->take_outgoing()) transport_.send(message.to, std::move(message.bytes));
+}
+
+void Daemon::ask_the_silent(Clock::time_point now) {
+  bool asked = false;
+  for (const WorldId neighbour : core_->waiting_for()) {
+    Line& from = line(neighbour);
+    if (now - from.heard < from.patience) continue;
+    spdlog::debug("nothing came from world {} for {:.1f} s; asking again", neighbour, seconds(from.patience));
+    from.heard = now;
+    from.patience = std::min<Clock::duration>(2 * from.patience, kPatienceMost);
+    core_->reconnect(neighbour);
+    asked = true;
+  }
+  if (asked) send_all();
+}
+
+wire::Status Daemon::status() const {
+  const border::CoreStats& stats = core_->stats();
+  wire::Status s;
+  s.instance(settings_.instance);
+  s.world(settings_.me);
+  s.epoch(settings_.epoch);
+  s.state(state_);
+  static const std::string host = host_name();
+  s.host(host);
+  s.pid(static_cast<std::uint32_t>(getpid()));
+  s.clock(core_->clock());
+  s.final_step(core_->final_step());
+  s.bodies(core_->own_bodies());
+  s.cells(core_->own_cells());
+  s.neighbours(static_cast<std::uint32_t>(core_->neighbours().size()));
+  const std::vector<WorldId> lacking = state_ == wire::STATE_RUNNING ? core_->waiting_for() : std::vector<WorldId>();
+  s.waiting_for(lacking.empty() ? kNoWorld : lacking.front());
+  s.steps(stats.steps);
+  s.syncs(stats.syncs);
+  s.mixed_islands(stats.mixed_islands);
+  s.arrived(stats.arrived);
+  s.departed(stats.departed);
+  s.wide_bodies(stats.wide_bodies);
+  s.messages_sent(stats.messages_sent);
+  s.bytes_sent(stats.bytes_sent);
+  s.frames_sent(stats.frames_sent);
+  s.frame_bodies_sent(stats.frame_bodies_sent);
+  s.parts_sent(stats.parts_sent);
+  s.messages_resent(stats.messages_resent);
+  s.duplicates(stats.duplicates);
+  s.refused(stats.refused);
+  s.clamped(stats.clamped);
+  s.non_finite(stats.non_finite);
+  s.interruptions(interruptions_);
+  s.work_seconds(seconds(working_));
+  s.waiting_seconds(seconds(waiting_));
+  s.paced_seconds(seconds(paced_));
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  s.cpu_seconds(seconds(usage.ru_utime) + seconds(usage.ru_stime));
+  s.peak_memory(static_cast<std::uint64_t>(usage.ru_maxrss) * 1024);
+  return s;
+}
+
+void Daemon::report_status(std::uint8_t state, Clock::time_point now) {
+  state_ = state;
+  status_at_ = now;
+  status_final_ = core_->final_step();
+  reports_.status(status());
+}
+
+void Daemon::report_if_due(Clock::time_point now) {
+  recorder_.flush_if_due(now);
+  // A paced session lets nobody run ahead of the slowest that it has heard of, so news of progress must not be late.
+  const bool progress = limit_known_ < kNoLimit && now - status_at_ >= kStatusAtMost &&
+                        core_->final_step() >= status_final_ + settings_.window / 4;
+  if (progress || now - status_at_ >= kStatusEvery) report_status(state_, now);
+}
+
+void Daemon::idle(Progress progress) {
+  const auto before = Clock::now();
+  if (progress == Progress::kWaiting && limit_known_ >= 0) ask_the_silent(before);
+  transport_.wait(kIdle);
+  const auto passed = Clock::now() - before;
+  if (state_ != wire::STATE_RUNNING) return;
+  if (progress == Progress::kWaiting) waiting_ += passed;
+  if (progress == Progress::kAtLimit) paced_ += passed;
+}
+
+Daemon::End Daemon::run() {
+  std::fill(lines_.begin(), lines_.end(), Line{Clock::now(), kPatience});
+  report_status(wire::STATE_PREPARING, Clock::now());
+  while (!stopped_.load()) {
+    const auto before = Clock::now();
+    receive_all();
+    if (const Step limit = limit_.load(); limit != limit_known_) {
+      limit_known_ = limit;
+      core_->set_limit(limit);
+      // Before the start nobody could be silent.
+      if (state_ < wire::STATE_RUNNING) {
+        std::fill(lines_.begin(), lines_.end(), Line{before, kPatience});
+        report_status(wire::STATE_RUNNING, before);
+      }
+    }
+    const Progress progress = core_->work();
+    send_all();
+    const auto now = Clock::now();
+    working_ += now - before;
+    report_if_due(now);
+    if (state_ == wire::STATE_PREPARING && transport_.connected() && reports_.listened_to())
+      report_status(wire::STATE_READY, now);
+    if (progress == Progress::kDone) {
+      if (state_ != wire::STATE_DONE && limit_known_ >= 0) {
+        recorder_.flush();
+        report_status(wire::STATE_DONE, now);
+      }
+      if (state_ == wire::STATE_DONE && released_.load()) break;
+    }
+    if (progress != Progress::kWorked) idle(progress);
+  }
+  if (stopped_.load()) return End::kStopped;
+  transport_.flush(kFlushAtMost);
+  if (!reports_.finish(kFinishAtMost)) spdlog::warn("some reader of this world's reports has not acknowledged all");
+  return End::kDone;
+}
+
+}  // namespace soda::world

@@ -1,0 +1,90 @@
+// One world at work: a loop, on the caller's thread, that carries messages between the protocol core and a transport, lets
+// the core work, and reports. Everything that depends on time happens here, and none of it can change a bit of the result.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/scene/scene.h"
+#include "common/territory.h"
+#include "server/border/world_core.h"
+#include "server/physics/model.h"
+#include "server/world/pacer.h"
+#include "server/world/recorder.h"
+#include "server/world/reports.h"
+#include "server/world/transport.h"
+
+namespace soda::world {
+
+struct DaemonSettings {
+  std::uint64_t instance = 0;  // of the session; copied into reports
+  WorldId me = 0;
+  WorldId worlds = 1;
+  std::uint32_t epoch = 0;
+  Step last_step = 0;
+  Step window = 48;                     // K
+  Step dump_first = -1, dump_last = -1;  // states to report; -1: none
+};
+
+class Daemon {
+ public:
+  // `transport` and `reports` must outlive the daemon. Throws SceneError for what physics cannot simulate,
+  // std::invalid_argument for more worlds than cells.
+  Daemon(Scene scene, const DaemonSettings& settings, Transport& transport, Reports& reports);
+
+  enum class End { kDone, kStopped };
+  // Runs until the last step is final everywhere and release() was called, or until stop(). Nothing is computed before
+  // the first set_limit(). Reports are complete and acknowledged when it returns kDone.
+  End run();
+
+  // From any thread.
+  void set_limit(Step newest);  // the clock does not pass it; never lowered
+  void release();               // the session has ended: who is done may leave
+  void stop();                  // leave as soon as possible
+
+  // After run().
+  const border::WorldCore& core() const { return *core_; }
+  std::uint64_t interruptions() const { return interruptions_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  // What is known of a neighbour's silence.
+  struct Line {
+    Clock::time_point heard{};        // last message, or last question because none came
+    Clock::duration patience{};       // how long to wait before the next question
+  };
+
+  bool receive_all();
+  void send_all();
+  void ask_the_silent(Clock::time_point now);
+  void report_if_due(Clock::time_point now);
+  void report_status(std::uint8_t state, Clock::time_point now);
+  void idle(border::Progress progress);
+  wire::Status status() const;
+  Line& line(WorldId neighbour);
+
+  const DaemonSettings settings_;
+  Transport& transport_;
+  Reports& reports_;
+  physics::Model model_;
+  TerritoryMap map_;
+  Recorder recorder_;
+  std::unique_ptr<border::WorldCore> core_;
+  std::vector<Line> lines_;  // by position in core_->neighbours()
+
+  std::atomic<Step> limit_{-1};  // -1: not started
+  std::atomic<bool> released_{false}, stopped_{false};
+  Step limit_known_ = -1;  // by the core
+
+  std::uint8_t state_ = wire::STATE_PREPARING;
+  Clock::time_point status_at_{};
+  Step status_final_ = 0;
+  std::uint64_t interruptions_ = 0;
+  std::uint64_t refusals_ = 0;
+  Clock::duration working_{}, waiting_{}, paced_{};
+};
+
+}  // namespace soda::world

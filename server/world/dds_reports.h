@@ -1,0 +1,34 @@
+// Reports over DDS.
+#pragma once
+
+#include <functional>
+
+#include "common/dds/participant.h"
+#include "server/world/reports.h"
+
+namespace soda::world {
+
+class DdsReports final : public Reports {
+ public:
+  // `supervised`: somebody waits for this world's digests, and must have been met before the start. `with_states`: whole
+  // states are to be reported. `give_up` ends the waiting for a slow reader.
+  DdsReports(dds::Participant& participant, bool supervised, bool with_states, std::function<bool()> give_up);
+
+  bool listened_to() const override;
+  void status(const wire::Status& sample) override;
+  void digests(const wire::Digests& sample) override;
+  void state(const wire::StateChunk& sample) override;
+  bool wants_transforms() const override { return transforms_.matched(); }
+  void transforms(const wire::Transforms& sample) override;
+  bool finish(std::chrono::milliseconds at_most) override;
+
+ private:
+  const bool supervised_;
+  const std::function<bool()> give_up_;
+  dds::Writer<wire::Status> status_;
+  dds::Writer<wire::Digests> digests_;
+  dds::Writer<wire::Transforms> transforms_;
+  std::unique_ptr<dds::Writer<wire::StateChunk>> states_;
+};
+
+}  // namespace soda::world

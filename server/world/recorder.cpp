@@ -1,0 +1,102 @@
+#include "server/world/recorder.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <span>
+
+#include "common/dds/checks.h"
+
+namespace soda::world {
+namespace {
+
+constexpr std::size_t kBatchSteps = 256;
+constexpr std::chrono::milliseconds kBatchAge{50};
+
+static_assert(std::endian::native == std::endian::little, "states are sent as raw little-endian memory");
+
+template <class T>
+wire::Octets octets(std::span<const T> values) {
+  wire::Octets bytes(values.size_bytes());
+  if (!bytes.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
+  return bytes;
+}
+
+// As many of `rest` as fit into `room` bytes, which they are taken from.
+template <class T>
+std::span<const T> take(std::span<const T>& rest, std::size_t& room) {
+  const auto taken = rest.first(std::min(rest.size(), room / sizeof(T)));
+  rest = rest.subspan(taken.size());
+  room -= taken.size_bytes();
+  return taken;
+}
+
+}  // namespace
+
+Recorder::Recorder(std::uint64_t instance, WorldId me, double dt, Step dump_first, Step dump_last, Reports& reports)
+    : instance_(instance), me_(me), dt_(dt), dump_first_(dump_first), dump_last_(dump_last), reports_(reports) {
+  batch_.instance(instance);
+  batch_.world(me);
+}
+
+void Recorder::finalised(Step step, const BodySet& produced, std::uint64_t hash) {
+  if (batch_.hashes().empty()) {
+    batch_.first(step);
+    batch_since_ = Clock::now();
+  }
+  batch_.bodies().push_back(static_cast<std::uint32_t>(produced.bodies.size()));
+  batch_.hashes().push_back(hash);
+  if (batch_.hashes().size() >= kBatchSteps) flush();
+  if (dump_first_ >= 0 && step >= dump_first_ && step <= dump_last_) report_state(step, produced);
+  if (reports_.wants_transforms()) report_transforms(step, produced);
+}
+
+void Recorder::flush_if_due(Clock::time_point now) {
+  if (!batch_.hashes().empty() && now - batch_since_ >= kBatchAge) flush();
+}
+
+void Recorder::flush() {
+  if (batch_.hashes().empty()) return;
+  reports_.digests(batch_);
+  batch_.bodies().clear();
+  batch_.hashes().clear();
+}
+
+void Recorder::report_state(Step step, const BodySet& produced) {
+  std::span<const BodyState> bodies(produced.bodies);
+  std::span<const ContactRecord> contacts(produced.contacts);
+  wire::StateChunk chunk;
+  chunk.instance(instance_);
+  chunk.world(me_);
+  chunk.step(step);
+  chunk.bodies_total(bodies.size());
+  chunk.contacts_total(contacts.size());
+  do {  // at least one, so that a world without bodies is heard of too
+    std::size_t room = dds::kMaxChunkBytes;
+    chunk.bodies(octets(take(bodies, room)));
+    chunk.contacts(octets(take(contacts, room)));
+    reports_.state(chunk);
+  } while (!bodies.empty() || !contacts.empty());
+}
+
+void Recorder::report_transforms(Step step, const BodySet& produced) {
+  wire::Transforms sample;
+  sample.instance(instance_);
+  sample.world(me_);
+  sample.step(step);
+  sample.time(static_cast<double>(step) * dt_);
+  sample.bodies().resize(produced.bodies.size());
+  for (std::size_t i = 0; i < produced.bodies.size(); ++i) {
+    const BodyState& body = produced.bodies[i];
+    wire::Transform& t = sample.bodies()[i];
+    t.id(body.id);
+    std::copy_n(body.position, 3, t.position().begin());
+    std::copy_n(body.orientation, 4, t.orientation().begin());
+    std::copy_n(body.linear_velocity, 3, t.linear_velocity().begin());
+    std::copy_n(body.angular_velocity, 3, t.angular_velocity().begin());
+    t.flags(body.flags);
+  }
+  reports_.transforms(sample);
+}
+
+}  // namespace soda::world

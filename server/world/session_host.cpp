@@ -1,0 +1,107 @@
+#include "server/world/session_host.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include "common/dds/checks.h"
+
+namespace soda::world {
+namespace {
+
+void hand_out(dds::Writer<wire::SceneChunk>& writer, std::uint64_t instance, const std::string& scene) {
+  const std::size_t count = (scene.size() + dds::kMaxChunkBytes - 1) / dds::kMaxChunkBytes;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t begin = i * dds::kMaxChunkBytes;
+    const std::size_t length = std::min(dds::kMaxChunkBytes, scene.size() - begin);
+    wire::SceneChunk chunk;
+    chunk.instance(instance);
+    chunk.index(static_cast<std::uint32_t>(i));
+    chunk.count(static_cast<std::uint32_t>(count));
+    chunk.bytes().resize(length);
+    std::memcpy(chunk.bytes().data(), scene.data() + begin, length);
+    if (!writer.write(chunk)) throw std::runtime_error("cannot hand out the scene");
+  }
+}
+
+}  // namespace
+
+SessionHost::SessionHost(dds::Participant& participant, const wire::Session& session, const std::string& encoded_scene,
+                         std::function<void(const wire::Control&)> on_control)
+    : session_(session),
+      on_control_(std::move(on_control)),
+      session_writer_(participant, dds::session_topic()),
+      scene_writer_(participant, dds::scene_topic()),
+      admission_writer_(participant, dds::admission_topic()),
+      control_writer_(participant, dds::control_topic()) {
+  hand_out(scene_writer_, session.instance(), encoded_scene);
+  service_ = std::make_unique<SessionService>(session_, [this](const wire::Control& control) {
+    if (!control_writer_.write(control)) spdlog::warn("cannot publish the session's control");
+    on_control_(control);
+  });
+  session_reader_ = std::make_unique<dds::Reader<wire::Session>>(
+      participant, dds::session_topic(), [this](wire::Session&& other, const dds::WriterKey&) { heard(other); });
+  join_reader_ = std::make_unique<dds::Reader<wire::Join>>(
+      participant, dds::join_topic(), [this](wire::Join&& claim, const dds::WriterKey&) { heard(claim); });
+  dds::ReaderEvents events;
+  events.on_liveliness = [this](const dds::WriterKey& writer, bool alive) {
+    const std::lock_guard lock(mutex_);
+    const auto known = status_writers_.find(writer);
+    if (!alive && known != status_writers_.end()) service_->silent(known->second);
+  };
+  status_reader_ = std::make_unique<dds::Reader<wire::Status>>(
+      participant, dds::status_topic(),
+      [this](wire::Status&& status, const dds::WriterKey& writer) {
+        {
+          const std::lock_guard lock(mutex_);
+          status_writers_[writer] = status.world();
+        }
+        service_->status(status);
+      },
+      events);
+  if (!session_writer_.write(session_)) throw std::runtime_error("cannot describe the session");
+}
+
+SessionHost::~SessionHost() {
+  session_reader_.reset();
+  join_reader_.reset();
+  status_reader_.reset();
+  service_.reset();  // its thread uses the writers
+}
+
+void SessionHost::heard(const wire::Session& other) {
+  if (other.protocol() == session_.protocol() && other.instance() == session_.instance()) return;
+  const bool was_first = other.protocol() != session_.protocol() || other.started() < session_.started() ||
+                         (other.started() == session_.started() && other.instance() < session_.instance());
+  if (!was_first) {
+    spdlog::warn("another world 0 came to this session; it will give way");
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  conflict_ = "the session has a world 0 already; choose another --session, or end that one";
+}
+
+void SessionHost::heard(const wire::Join& claim) {
+  const std::string reason = service_->join(claim);
+  if (!reason.empty())
+    spdlog::warn("refused a daemon that wants to be world {} ({}, process {}): {}", claim.world(), claim.host(),
+                 claim.pid(), reason);
+  wire::Admission answer;
+  answer.instance(session_.instance());
+  answer.nonce(claim.nonce());
+  answer.accepted(reason.empty());
+  answer.reason(reason);
+  if (!admission_writer_.write(answer)) spdlog::warn("cannot answer a daemon that wants to join");
+}
+
+std::string SessionHost::conflict() const {
+  const std::lock_guard lock(mutex_);
+  return conflict_;
+}
+
+void SessionHost::finish(std::chrono::milliseconds at_most) { control_writer_.wait_acknowledged(at_most); }
+
+}  // namespace soda::world

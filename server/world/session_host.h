@@ -1,0 +1,48 @@
+// The session service on the network: world 0's side.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "common/dds/participant.h"
+#include "server/world/session_service.h"
+
+namespace soda::world {
+
+class SessionHost {
+ public:
+  // Describes the session, hands out the scene and admits worlds from now on. `on_control` hears what is published, for
+  // world 0 itself; it is called from the service's thread, at once, too.
+  SessionHost(dds::Participant& participant, const wire::Session& session, const std::string& encoded_scene,
+              std::function<void(const wire::Control&)> on_control);
+  ~SessionHost();
+
+  // Why world 0 must leave, or "": another world 0 was there before.
+  std::string conflict() const;
+  // Blocks until all members have the last Control, or the time is up.
+  void finish(std::chrono::milliseconds at_most);
+
+ private:
+  void heard(const wire::Session& other);
+  void heard(const wire::Join& claim);
+
+  const wire::Session session_;
+  const std::function<void(const wire::Control&)> on_control_;
+  mutable std::mutex mutex_;
+  std::string conflict_;
+  std::map<dds::WriterKey, WorldId> status_writers_;
+  dds::Writer<wire::Session> session_writer_;
+  dds::Writer<wire::SceneChunk> scene_writer_;
+  dds::Writer<wire::Admission> admission_writer_;
+  dds::Writer<wire::Control> control_writer_;
+  std::unique_ptr<SessionService> service_;
+  std::unique_ptr<dds::Reader<wire::Session>> session_reader_;
+  std::unique_ptr<dds::Reader<wire::Join>> join_reader_;
+  std::unique_ptr<dds::Reader<wire::Status>> status_reader_;
+};
+
+}  // namespace soda::world
