@@ -20,6 +20,8 @@ std::uint64_t bodies_hash(std::span<const BodyState> bodies) {
   return sum;
 }
 
+std::uint64_t record_hash(const BodyState& body) { return XXH3_64bits(&body, sizeof body); }
+
 std::uint64_t full_hash(const BodySet& set) {
   const std::uint64_t bodies = XXH3_64bits(set.bodies.data(), set.bodies.size() * sizeof(BodyState));
   return XXH3_64bits_withSeed(set.contacts.data(), set.contacts.size() * sizeof(ContactRecord), bodies);

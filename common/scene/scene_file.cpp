@@ -205,7 +205,10 @@ std::string read_file(const std::filesystem::path& path) {
 void write_file(const std::filesystem::path& path, std::string_view bytes) {
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   // In the same folder, because a name can only be given within one file system.
-  std::string temporary = (folder / ("." + path.filename().string() + ".XXXXXX")).string();
+  std::string name = ".";
+  name += path.filename().string();
+  name += ".XXXXXX";
+  std::string temporary = (folder / name).string();
   const auto fail = [&](const char* what) {
     const std::string reason = std::string(what) + ": " + std::strerror(errno);
     refuse(path.string(), reason);

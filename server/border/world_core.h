@@ -22,7 +22,8 @@ namespace soda::border {
 
 struct CoreSettings {
   WorldId me = 0;
-  std::uint32_t epoch = 0;  // of this start of the world
+  std::uint32_t epoch = 0;    // of this start of the world
+  std::uint64_t session = 0;  // what all worlds of a session have in common (a hash of scene and settings); others' messages are refused
   Step last_step = 0;       // the run ends when this step is final
 };
 
@@ -41,7 +42,6 @@ struct CoreStats {
   std::uint64_t refused = 0;         // malformed or foreign messages, and protocol errors
   std::uint64_t clamped = 0;         // bodies slowed to the scene's largest speed, summed over steps
   std::uint64_t non_finite = 0;      // bodies whose result was not finite and which were held, summed over steps
-  double solve_seconds = 0;          // unused by the core; the daemon fills its own times in
 };
 
 // Told what a world computes. All calls come from within WorldCore::work or receive, on the caller's thread.

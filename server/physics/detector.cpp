@@ -49,10 +49,19 @@ Vec3 clamp_to(const Vec3& local, const Vec3& half) { return local.cwiseMax(-half
 // a point may appear by it.
 constexpr double kRockAngle = 0.02;  // rad
 
+// Bullet's own pools hold thousands of manifolds and algorithms, megabytes to clear; one of each is in use at a time here
+// (a few more inside compound and concave algorithms, which then come from the heap).
+btDefaultCollisionConstructionInfo small_pools() {
+  btDefaultCollisionConstructionInfo info;
+  info.m_defaultMaxPersistentManifoldPoolSize = 4;
+  info.m_defaultMaxCollisionAlgorithmPoolSize = 16;
+  return info;
+}
+
 }  // namespace
 
 struct Detector::Bullet {
-  btDefaultCollisionConfiguration configuration;
+  btDefaultCollisionConfiguration configuration{small_pools()};
   btCollisionDispatcher dispatcher{&configuration};
   btVoronoiSimplexSolver simplex;
   btGjkEpaPenetrationDepthSolver epa;

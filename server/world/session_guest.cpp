@@ -29,14 +29,14 @@ SessionGuest::SessionGuest(dds::Participant& participant, const std::string& ses
         if (sample.protocol() != claim_.protocol())
           other_protocol_ = sample.protocol();
         else
-          offers_[sample.instance()].session = std::move(sample);
+          offer(sample.instance()).session = std::move(sample);
         changed_.notify_all();
       },
       events);
   scene_ = std::make_unique<dds::Reader<wire::SceneChunk>>(
       participant, dds::scene_topic(), [this](wire::SceneChunk&& sample, const dds::WriterKey&) {
         const std::lock_guard lock(mutex_);
-        auto& chunks = offers_[sample.instance()].chunks;
+        auto& chunks = offer(sample.instance()).chunks;
         if (chunks.empty()) chunks.resize(sample.count());
         if (sample.count() != chunks.size()) return dds::refusals().add("soda/scene", "the number of chunks has changed");
         chunks[sample.index()].assign(sample.bytes().begin(), sample.bytes().end());
@@ -46,24 +46,31 @@ SessionGuest::SessionGuest(dds::Participant& participant, const std::string& ses
       participant, dds::admission_topic(), [this](wire::Admission&& sample, const dds::WriterKey&) {
         if (sample.nonce() != claim_.nonce()) return;
         const std::lock_guard lock(mutex_);
-        offers_[sample.instance()].admission = std::move(sample);
+        offer(sample.instance()).admission = std::move(sample);
         changed_.notify_all();
       });
   control_ = std::make_unique<dds::Reader<wire::Control>>(
       participant, dds::control_topic(), [this](wire::Control&& sample, const dds::WriterKey&) {
-        std::function<void(const wire::Control&)> tell;
+        const std::lock_guard tell_lock(tell_mutex_);
+        bool mine = false;
         {
           const std::lock_guard lock(mutex_);
-          offers_[sample.instance()].control = sample;
-          if (sample.instance() == instance_) tell = on_control_;
+          offer(sample.instance()).control = sample;
+          mine = sample.instance() == instance_;
         }
-        if (tell) tell(sample);
+        if (mine && on_control_) on_control_(sample);
       });
   join_ = std::make_unique<dds::Writer<wire::Join>>(participant, dds::join_topic());
   join_->write(claim_);
 }
 
 SessionGuest::~SessionGuest() = default;
+
+SessionGuest::Offer& SessionGuest::offer(std::uint64_t instance) {
+  constexpr std::size_t kMost = 8;
+  if (offers_.size() >= kMost && !offers_.contains(instance)) throw std::runtime_error("too many sessions of one name");
+  return offers_[instance];
+}
 
 std::optional<SessionGuest::Admitted> SessionGuest::ready() const {
   for (const auto& [instance, offer] : offers_) {
@@ -122,13 +129,14 @@ std::optional<SessionGuest::Admitted> SessionGuest::join(const std::function<boo
 }
 
 void SessionGuest::listen(std::function<void(const wire::Control&)> on_control) {
+  const std::lock_guard tell_lock(tell_mutex_);
+  on_control_ = std::move(on_control);
   std::optional<wire::Control> newest;
   {
     const std::lock_guard lock(mutex_);
-    on_control_ = on_control;
-    newest = offers_[instance_].control;
+    newest = offer(instance_).control;
   }
-  if (newest) on_control(*newest);
+  if (newest && on_control_) on_control_(*newest);
 }
 
 bool SessionGuest::host_gone() const {

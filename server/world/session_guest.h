@@ -36,7 +36,8 @@ class SessionGuest {
   // Nothing if `stop` said so. Throws Refused.
   std::optional<Admitted> join(const std::function<bool()>& stop);
 
-  // `on_control` hears the newest Control and all that follow, of the session that admitted this daemon.
+  // `on_control` hears the newest Control and all that follow, of the session that admitted this daemon. Null takes it
+  // back: it does not run any more when this returns.
   void listen(std::function<void(const wire::Control&)> on_control);
   // Whether world 0 is gone.
   bool host_gone() const;
@@ -49,18 +50,21 @@ class SessionGuest {
     std::vector<std::string> chunks;  // by index; "" if not there yet
   };
 
+  // The offer of that session; with the lock held. There is room for a few, in case several daemons claim to be world 0.
+  Offer& offer(std::uint64_t instance);
   std::optional<Admitted> ready() const;  // with the lock held; throws Refused
   void log_waiting() const;               // likewise
 
   const std::string name_;
   const wire::Join claim_;
-  mutable std::mutex mutex_;
+  std::mutex tell_mutex_;  // guards on_control_, also while it runs; taken before mutex_
+  std::function<void(const wire::Control&)> on_control_;
+  mutable std::mutex mutex_;  // guards the rest
   std::condition_variable changed_;
   std::map<std::uint64_t, Offer> offers_;  // by instance
   std::uint64_t instance_ = 0;             // that admitted this daemon
   std::uint32_t other_protocol_ = 0;       // of a session that speaks another version; 0: none was met
   int hosts_ = 0;                          // session writers matched
-  std::function<void(const wire::Control&)> on_control_;
   std::unique_ptr<dds::Reader<wire::Session>> session_;
   std::unique_ptr<dds::Reader<wire::SceneChunk>> scene_;
   std::unique_ptr<dds::Reader<wire::Admission>> admission_;

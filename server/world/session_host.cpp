@@ -86,7 +86,9 @@ void SessionHost::heard(const wire::Session& other) {
 
 void SessionHost::heard(const wire::Join& claim) {
   const std::string reason = service_->join(claim);
-  if (!reason.empty())
+  if (claim.protocol() != session_.protocol())
+    spdlog::warn("refused a daemon that wants to join: {}", reason);
+  else if (!reason.empty())
     spdlog::warn("refused a daemon that wants to be world {} ({}, process {}): {}", claim.world(), claim.host(),
                  claim.pid(), reason);
   wire::Admission answer;

@@ -1,0 +1,38 @@
+// Reports over DDS.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "client/cli/report_source.h"
+#include "common/dds/participant.h"
+
+namespace soda::cli {
+
+class DdsSource final : public ReportSource {
+ public:
+  // `with_states`: also the whole states of the steps that the session dumps.
+  DdsSource(const dds::NetworkOptions& network, const std::string& session, bool with_states);
+
+  std::optional<dds::Report> next(std::chrono::milliseconds at_most) override;
+  std::set<WorldId> silent() const override;
+
+ private:
+  void push(dds::Report report);
+
+  dds::Participant participant_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<dds::Report> queue_;
+  std::map<dds::WriterKey, WorldId> status_writers_;
+  std::set<WorldId> silent_;
+  std::optional<dds::Reader<wire::StateChunk>> states_;
+  std::optional<dds::Reader<wire::Digests>> digests_;
+  std::optional<dds::Reader<wire::Status>> status_;
+  std::optional<dds::Reader<wire::Session>> session_;
+};
+
+}  // namespace soda::cli

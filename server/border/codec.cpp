@@ -1,0 +1,227 @@
+#include "server/border/codec.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <type_traits>
+
+namespace soda::border {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the wire format is this machine's");
+
+constexpr std::uint32_t kMagic = 0x41444f53;  // "SODA"
+constexpr std::size_t kRecordHead = sizeof(ContactRecord) - kMaxContactPoints * sizeof(ContactPoint);
+
+void put_bytes(std::vector<std::byte>& out, const void* data, std::size_t size) {
+  if (size == 0) return;
+  const std::size_t at = out.size();
+  out.resize(at + size);
+  std::memcpy(out.data() + at, data, size);
+}
+
+template <typename T>
+void put(std::vector<std::byte>& out, const T& value) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  put_bytes(out, &value, sizeof value);
+}
+
+class Reader {
+ public:
+  explicit Reader(std::span<const std::byte>& in) : in_(in) {}
+
+  template <typename T>
+  T get(const char* field) {
+    T value;
+    get_bytes(&value, sizeof(T), field);
+    return value;
+  }
+  void get_bytes(void* to, std::size_t size, const char* field) {
+    if (in_.size() < size) throw CodecError(std::string(field) + ": cut short");
+    std::memcpy(to, in_.data(), size);
+    in_ = in_.subspan(size);
+  }
+  // A count of things that take at least `least` bytes each: refused before memory is taken for them.
+  std::size_t count(std::size_t least, const char* field) {
+    const auto n = get<std::uint32_t>(field);
+    if (n > in_.size() / least) throw CodecError(std::string(field) + ": more than the message holds");
+    return n;
+  }
+  bool empty() const { return in_.empty(); }
+
+ private:
+  std::span<const std::byte>& in_;
+};
+
+bool finite(const double* p, int n) {
+  double sum = 0;
+  for (int i = 0; i < n; ++i) sum += p[i] * 0.0;
+  return sum == 0;
+}
+
+bool unit(const double* q) {
+  const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  return std::abs(square - 1) < 1e-6;
+}
+
+std::string name(BodyId id) { return "body " + std::to_string(id); }
+
+void check(const BodyState& body, const physics::Model& model) {
+  if (!model.find(body.id)) throw CodecError(name(body.id) + ": not in the scene");
+  if (!finite(body.position, 13)) throw CodecError(name(body.id) + ": not finite");
+  if (!unit(body.orientation)) throw CodecError(name(body.id) + ": orientation is not a unit quaternion");
+  if (body.flags & ~std::uint32_t{kAsleep | 7u * kDriveReversed}) throw CodecError(name(body.id) + ": unknown flags");
+}
+
+void check(const ContactRecord& record, const physics::Model& model) {
+  if (!model.find(record.a)) throw CodecError("contact of " + name(record.a) + ": not in the scene");
+  if (record.with_static() ? !model.find_static(record.b & ~kStaticBit) : !model.find(record.b))
+    throw CodecError("contact of " + name(record.a) + ": partner not in the scene");
+  if (!record.with_static() && record.b <= record.a)
+    throw CodecError("contact of " + name(record.a) + ": does not belong to the lower id");
+  constexpr int kHeadDoubles = (static_cast<int>(kRecordHead) - 24) / 8;
+  if (!finite(record.normal, kHeadDoubles)) throw CodecError("contact of " + name(record.a) + ": not finite");
+  if (!unit(record.orientation_a) || !unit(record.orientation_b))
+    throw CodecError("contact of " + name(record.a) + ": orientation is not a unit quaternion");
+  for (std::uint32_t i = 0; i < record.count; ++i)
+    if (!finite(record.points[i].arm_a, 7)) throw CodecError("contact of " + name(record.a) + ": point not finite");
+}
+
+void put_frame(std::vector<std::byte>& out, const Frame& frame) {
+  put(out, frame.step);
+  put(out, frame.revision);
+  encode_set(frame.set, out);
+}
+
+Frame get_frame(Reader& in, std::span<const std::byte>& rest, const physics::Model& model) {
+  Frame frame;
+  frame.step = in.get<Step>("frame step");
+  frame.revision = in.get<Revision>("frame revision");
+  frame.set = decode_set(rest, model);
+  return frame;
+}
+
+void put_part(std::vector<std::byte>& out, const Part& part) {
+  put(out, part.origin);
+  put(out, part.step);
+  put(out, part.through);
+  put(out, part.revision);
+  put(out, static_cast<std::uint8_t>(part.final));
+  put(out, static_cast<std::uint32_t>(part.components.size()));
+  for (const Component& component : part.components) {
+    encode_set(component.set, out);
+    put(out, static_cast<std::uint32_t>(component.ports.size()));
+    for (const Port& port : component.ports) {
+      put(out, port.body);
+      put(out, port.owner);
+      put(out, port.record);
+    }
+  }
+}
+
+Part get_part(Reader& in, std::span<const std::byte>& rest, const physics::Model& model) {
+  Part part;
+  part.origin = in.get<WorldId>("part origin");
+  part.step = in.get<Step>("part step");
+  part.through = in.get<Step>("part through");
+  part.revision = in.get<Revision>("part revision");
+  part.final = in.get<std::uint8_t>("part final") != 0;
+  part.components.resize(in.count(12, "part components"));
+  for (Component& component : part.components) {
+    component.set = decode_set(rest, model);
+    component.ports.resize(in.count(20, "ports"));
+    for (Port& port : component.ports) {
+      port.body = in.get<BodyId>("port body");
+      port.owner = in.get<WorldId>("port owner");
+      port.record = in.get<std::uint64_t>("port record");
+      if (!model.find(port.body)) throw CodecError("port: " + name(port.body) + " is not in the scene");
+    }
+  }
+  return part;
+}
+
+}  // namespace
+
+void encode_set(const BodySet& set, std::vector<std::byte>& out) {
+  put(out, static_cast<std::uint32_t>(set.bodies.size()));
+  put(out, static_cast<std::uint32_t>(set.contacts.size()));
+  put_bytes(out, set.bodies.data(), set.bodies.size() * sizeof(BodyState));
+  for (const ContactRecord& record : set.contacts) put_bytes(out, &record, kRecordHead + record.count * sizeof(ContactPoint));
+}
+
+BodySet decode_set(std::span<const std::byte>& bytes, const physics::Model& model) {
+  Reader in(bytes);
+  BodySet set;
+  const std::size_t bodies = in.count(sizeof(BodyState), "bodies");
+  const std::size_t contacts = in.count(kRecordHead, "contacts");
+  set.bodies.resize(bodies);
+  in.get_bytes(set.bodies.data(), bodies * sizeof(BodyState), "bodies");
+  for (std::size_t i = 0; i < bodies; ++i) {
+    check(set.bodies[i], model);
+    if (i > 0 && set.bodies[i].id <= set.bodies[i - 1].id) throw CodecError(name(set.bodies[i].id) + ": out of order");
+  }
+  set.contacts.resize(contacts);
+  for (std::size_t i = 0; i < contacts; ++i) {
+    ContactRecord& record = set.contacts[i];
+    in.get_bytes(&record, kRecordHead, "contact record");
+    if (record.count < 1 || record.count > kMaxContactPoints)
+      throw CodecError("contact of " + name(record.a) + ": number of points");
+    in.get_bytes(record.points, record.count * sizeof(ContactPoint), "contact points");
+    check(record, model);
+    if (i > 0 && !record_before(set.contacts[i - 1], record))
+      throw CodecError("contact of " + name(record.a) + ": out of order");
+  }
+  return set;
+}
+
+std::vector<std::byte> encode(const Message& message) {
+  std::vector<std::byte> out;
+  const Header& h = message.header;
+  put(out, kMagic);
+  put(out, kCodecVersion);
+  put(out, h.session);
+  put(out, h.from);
+  put(out, h.to);
+  put(out, h.epoch);
+  put(out, h.to_epoch);
+  put(out, h.sequence);
+  put(out, h.ack);
+  put(out, static_cast<std::uint8_t>(h.need));
+  put(out, h.upto);
+  put(out, h.final_step);
+  put(out, h.durable);
+  put(out, static_cast<std::uint32_t>(message.frames.size()));
+  put(out, static_cast<std::uint32_t>(message.parts.size()));
+  for (const Frame& frame : message.frames) put_frame(out, frame);
+  for (const Part& part : message.parts) put_part(out, part);
+  return out;
+}
+
+Message decode(std::span<const std::byte> bytes, const physics::Model& model) {
+  std::span<const std::byte> rest = bytes;
+  Reader in(rest);
+  if (in.get<std::uint32_t>("magic") != kMagic) throw CodecError("not a SODA border message");
+  if (const auto version = in.get<std::uint32_t>("version"); version != kCodecVersion)
+    throw CodecError("border message of version " + std::to_string(version) + ", this is " +
+                     std::to_string(kCodecVersion));
+  Message message;
+  Header& h = message.header;
+  h.session = in.get<std::uint64_t>("session");
+  h.from = in.get<WorldId>("from");
+  h.to = in.get<WorldId>("to");
+  h.epoch = in.get<std::uint32_t>("epoch");
+  h.to_epoch = in.get<std::uint32_t>("to_epoch");
+  h.sequence = in.get<std::uint64_t>("sequence");
+  h.ack = in.get<std::uint64_t>("ack");
+  h.need = in.get<std::uint8_t>("need") != 0;
+  h.upto = in.get<Step>("upto");
+  h.final_step = in.get<Step>("final");
+  h.durable = in.get<Step>("durable");
+  const std::size_t frames = in.count(24, "frames"), parts = in.count(33, "parts");
+  for (std::size_t i = 0; i < frames; ++i) message.frames.push_back(get_frame(in, rest, model));
+  for (std::size_t i = 0; i < parts; ++i) message.parts.push_back(get_part(in, rest, model));
+  if (!in.empty()) throw CodecError("border message: more bytes than it says");
+  return message;
+}
+
+}  // namespace soda::border

@@ -1,0 +1,75 @@
+#include "server/border/link.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace soda::border {
+
+Link::Link(std::uint64_t session, WorldId me, std::uint32_t epoch, WorldId peer)
+    : session_(session), me_(me), peer_(peer), epoch_(epoch) {}
+
+Header Link::header(std::uint64_t sequence, bool need) const {
+  Header h;
+  h.session = session_;
+  h.from = me_;
+  h.to = peer_;
+  h.epoch = epoch_;
+  h.to_epoch = peer_epoch_;
+  h.sequence = sequence;
+  h.ack = received_;
+  h.need = need;
+  h.upto = told_upto_;
+  h.final_step = told_final_;
+  return h;
+}
+
+void Link::send(Step upto, Step final_step, std::vector<std::vector<std::byte>>& out) {
+  told_upto_ = upto;
+  told_final_ = final_step;
+  next_.header = header(++sent_, false);
+  log_.push_back(encode(next_));
+  out.push_back(log_.back());
+  next_.frames.clear();
+  next_.parts.clear();
+}
+
+void Link::interrupted() { ask_ = repeat_ = true; }
+
+void Link::collect(std::vector<std::vector<std::byte>>& out) {
+  if (std::exchange(repeat_, false)) {
+    out.insert(out.end(), log_.begin(), log_.end());
+    resent_ += log_.size();
+  }
+  if (std::exchange(ask_, false)) {
+    asked_after_ = received_;
+    Message request;
+    request.header = header(0, true);
+    out.push_back(encode(request));
+  }
+}
+
+void Link::receive(Message message, const std::function<void(Message&)>& deliver) {
+  const Header& h = message.header;
+  peer_epoch_ = h.epoch;
+  const std::uint64_t logged_before = sent_ - log_.size();
+  if (h.ack > logged_before && h.ack <= sent_)
+    log_.erase(log_.begin(), log_.begin() + static_cast<std::ptrdiff_t>(h.ack - logged_before));
+  if (h.need) repeat_ = true;
+  if (h.sequence == 0) return;
+  if (h.sequence <= received_ || early_.contains(h.sequence)) {
+    ++duplicates_;
+    return;
+  }
+  early_.emplace(h.sequence, std::move(message));
+  while (!early_.empty() && early_.begin()->first == received_ + 1) {
+    Message next = std::move(early_.begin()->second);
+    early_.erase(early_.begin());
+    ++received_;
+    upto_ = next.header.upto;
+    final_ = std::max(final_, next.header.final_step);
+    deliver(next);
+  }
+  if (!early_.empty() && asked_after_ != received_) ask_ = true;
+}
+
+}  // namespace soda::border

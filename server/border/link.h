@@ -1,0 +1,65 @@
+// The numbered streams to and from one neighbour: numbering, putting in order, dropping what comes twice, and a log of
+// what has not been acknowledged, to be sent again when asked.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "server/border/codec.h"
+#include "server/border/message.h"
+
+namespace soda::border {
+
+class Link {
+ public:
+  Link(std::uint64_t session, WorldId me, std::uint32_t epoch, WorldId peer);
+
+  WorldId peer() const { return peer_; }
+
+  // ---- out
+  void add(Frame frame) { next_.frames.push_back(std::move(frame)); }
+  void add(Part part) { next_.parts.push_back(std::move(part)); }
+  bool has_content() const { return !next_.frames.empty() || !next_.parts.empty(); }
+  Step told_upto() const { return told_upto_; }
+  Step told_final() const { return told_final_; }
+  // Closes the next message of the stream and appends it, as bytes, to `out`.
+  void send(Step upto, Step final_step, std::vector<std::vector<std::byte>>& out);
+  // Asks the peer for what is missing here, and repeats what it has not acknowledged, at the next collect().
+  void interrupted();
+  // Appends requests and repetitions that are due.
+  void collect(std::vector<std::vector<std::byte>>& out);
+
+  // ---- in
+  // Takes a decoded message from the peer; hands every message whose turn has come to `deliver`, in order.
+  void receive(Message message, const std::function<void(Message&)>& deliver);
+
+  // The peer's values, counted: everything said before them has been delivered.
+  Step upto() const { return upto_; }
+  Step final_step() const { return final_; }
+  std::uint64_t duplicates() const { return duplicates_; }
+  std::uint64_t resent() const { return resent_; }
+
+ private:
+  Header header(std::uint64_t sequence, bool need) const;
+  std::uint64_t session_;
+  WorldId me_, peer_;
+  std::uint32_t epoch_;
+  std::uint32_t peer_epoch_ = 0;
+
+  Message next_;
+  Step told_upto_ = -1, told_final_ = -1;
+  std::uint64_t sent_ = 0;                     // newest number sent
+  std::deque<std::vector<std::byte>> log_;     // messages sent_ - log_.size() + 1 .. sent_
+  bool repeat_ = false, ask_ = false;
+
+  std::uint64_t received_ = 0;                 // everything up to this number has been delivered
+  std::uint64_t asked_after_ = ~std::uint64_t{0};  // the gap after this number has been asked for already
+  std::map<std::uint64_t, Message> early_;     // beyond a gap
+  Step upto_ = -1, final_ = -1;
+  std::uint64_t duplicates_ = 0, resent_ = 0;
+};
+
+}  // namespace soda::border

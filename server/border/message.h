@@ -1,0 +1,67 @@
+// What worlds tell each other, as plain values. codec.h turns it into bytes and back.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/body_set.h"
+#include "common/ids.h"
+
+namespace soda::border {
+
+struct Revision {
+  std::uint32_t epoch = 0, count = 0;
+};
+
+// The bodies that the sender produced at a step and that the receiver owns then (arrivals) or has near. Left out where it
+// would say just what the receiver assumes without it: the sleeping bodies of the step before.
+struct Frame {
+  Step step = 0;
+  Revision revision;
+  BodySet set;
+};
+
+// A foreign body that a component touches.
+struct Port {
+  BodyId body = 0;
+  WorldId owner = 0;
+  std::uint64_t record = 0;  // record_hash of the state that the component was found with
+};
+
+// Own bodies connected by own contacts, the contacts of all of them (those with ports and static bodies included), as
+// found at the step, and the ports. A component without own bodies tells that wide bodies of two others touch here.
+struct Component {
+  BodySet set;
+  std::vector<Port> ports;
+};
+
+// All components of a world that touch foreign bodies at a step.
+struct Part {
+  WorldId origin = 0;
+  Step step = 0;
+  Step through = 0;  // newest step for which it holds unchanged; this version sends one part per step
+  Revision revision;
+  bool final = false;
+  std::vector<Component> components;
+};
+
+struct Header {
+  std::uint64_t session = 0;  // what both ends must agree on: see session_tag
+  WorldId from = 0, to = 0;
+  std::uint32_t epoch = 0, to_epoch = 0;
+  std::uint64_t sequence = 0;  // from 1; 0: outside of the stream, only `ack` and `need` count
+  std::uint64_t ack = 0;       // everything up to this number has arrived at the sender
+  bool need = false;           // the sender asks for everything after `ack` again
+  Step upto = 0;               // the sender's front: all states up to it are computed and told
+  Step final_step = 0;
+  Step durable = 0;
+};
+
+// Everything from one world to another is one numbered stream of these.
+struct Message {
+  Header header;
+  std::vector<Frame> frames;
+  std::vector<Part> parts;
+};
+
+}  // namespace soda::border

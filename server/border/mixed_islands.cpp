@@ -1,0 +1,110 @@
+#include "server/border/mixed_islands.h"
+
+#include <algorithm>
+#include <cstring>
+#include <set>
+#include <string>
+
+#include "common/state_hash.h"
+
+namespace soda::border {
+
+bool MixedIslands::add(Part part) {
+  const WorldId origin = part.origin;
+  if (parts_.contains(origin)) return false;
+  Indexed indexed;
+  for (std::uint32_t i = 0; i < part.components.size(); ++i) {
+    for (const BodyState& body : part.components[i].set.bodies) indexed.holder.emplace(body.id, i);
+    for (const Port& port : part.components[i].ports) indexed.port_users.emplace(port.body, i);
+  }
+  indexed.part = std::move(part);
+  parts_.emplace(origin, std::move(indexed));
+  return true;
+}
+
+const Part* MixedIslands::find(WorldId origin) const {
+  const auto it = parts_.find(origin);
+  return it == parts_.end() ? nullptr : &it->second.part;
+}
+
+MixedIslands::Closure MixedIslands::close(Key from) const {
+  std::set<Key> seen{from};
+  std::set<WorldId> used{from.origin}, missing;
+  std::vector<Key> todo{from};
+  const auto visit = [&](Key key) {
+    if (seen.insert(key).second) todo.push_back(key);
+  };
+  const auto part_of = [&](WorldId world) -> const Indexed* {
+    const auto it = parts_.find(world);
+    if (it == parts_.end()) {
+      missing.insert(world);
+      return nullptr;
+    }
+    used.insert(world);
+    return &it->second;
+  };
+  std::vector<WorldId> reached;
+  while (!todo.empty()) {
+    const Key key = todo.back();
+    todo.pop_back();
+    const Component& component = parts_.at(key.origin).part.components[key.component];
+    for (const Port& port : component.ports) {
+      const Indexed* part = part_of(port.owner);
+      if (!part) continue;
+      const auto holder = part->holder.find(port.body);
+      if (holder == part->holder.end())
+        throw ProtocolError("world " + std::to_string(key.origin) + " touches body " + std::to_string(port.body) +
+                            ", but its owner " + std::to_string(port.owner) + " does not say so");
+      const auto& bodies = part->part.components[holder->second].set.bodies;
+      const auto body = std::lower_bound(bodies.begin(), bodies.end(), port.body,
+                                         [](const BodyState& b, BodyId id) { return b.id < id; });
+      if (record_hash(*body) != port.record)
+        throw ProtocolError("worlds " + std::to_string(key.origin) + " and " + std::to_string(port.owner) +
+                            " hold different states of body " + std::to_string(port.body));
+      visit({port.owner, holder->second});
+    }
+    for (const BodyState& body : component.set.bodies) {
+      if (!neighbourhood_.is_wide(body)) continue;
+      neighbourhood_.reached(body, reached);
+      for (const WorldId world : reached)
+        if (const Indexed* part = part_of(world)) {
+          const auto [first, last] = part->port_users.equal_range(body.id);
+          for (auto it = first; it != last; ++it) visit({world, it->second});
+        }
+    }
+  }
+  Closure closure;
+  closure.components.assign(seen.begin(), seen.end());
+  closure.worlds.assign(used.begin(), used.end());
+  closure.missing.assign(missing.begin(), missing.end());
+  return closure;
+}
+
+BodySet MixedIslands::assemble(const Closure& closure) const {
+  BodySet set;
+  for (const Key& key : closure.components) {
+    const BodySet& component = parts_.at(key.origin).part.components[key.component].set;
+    set.bodies.insert(set.bodies.end(), component.bodies.begin(), component.bodies.end());
+    set.contacts.insert(set.contacts.end(), component.contacts.begin(), component.contacts.end());
+  }
+  std::sort(set.bodies.begin(), set.bodies.end(), [](const BodyState& l, const BodyState& r) { return l.id < r.id; });
+  for (std::size_t i = 1; i < set.bodies.size(); ++i)
+    if (set.bodies[i].id == set.bodies[i - 1].id)
+      throw ProtocolError("two worlds own body " + std::to_string(set.bodies[i].id));
+  // A contact across a border is found by both sides; they must have found the same.
+  std::sort(set.contacts.begin(), set.contacts.end(), record_before);
+  std::size_t kept = 0;
+  for (const ContactRecord& record : set.contacts) {
+    if (kept > 0 && !record_before(set.contacts[kept - 1], record)) {
+      if (std::memcmp(&set.contacts[kept - 1], &record, sizeof record) != 0)
+        throw ProtocolError("two worlds found different contacts between bodies " + std::to_string(record.a) + " and " +
+                            std::to_string(record.b & ~kStaticBit));
+      continue;
+    }
+    set.contacts[kept++] = record;
+  }
+  set.contacts.resize(kept);
+  return set;
+}
+
+}  // namespace soda::border

@@ -1,0 +1,61 @@
+// Islands with bodies of several worlds at one step: gathers the worlds' parts until an island is whole.
+//
+// The graph has the components of all parts as nodes. A component leads to the component that holds a body which it has
+// as a port; a wide body leads to every component that has it as a port, so every world that it reaches must have told
+// its part, if only to say that nothing touches it there. An island is closed when nothing that is led to is missing.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <unordered_map>
+#include <vector>
+
+#include "server/border/message.h"
+#include "server/border/neighbourhood.h"
+
+namespace soda::border {
+
+// Two worlds told things that cannot both be true: a bug, never the network's fault.
+struct ProtocolError : std::logic_error {
+  using std::logic_error::logic_error;
+};
+
+class MixedIslands {
+ public:
+  explicit MixedIslands(const Neighbourhood& neighbourhood) : neighbourhood_(neighbourhood) {}
+
+  struct Key {
+    WorldId origin = 0;
+    std::uint32_t component = 0;
+    bool operator<(const Key& o) const { return origin != o.origin ? origin < o.origin : component < o.component; }
+  };
+  struct Closure {
+    std::vector<Key> components;     // reached so far, ascending
+    std::vector<WorldId> worlds;     // whose parts were used, ascending
+    std::vector<WorldId> missing;    // whose parts are still needed; empty: closed
+  };
+
+  void clear() { parts_.clear(); }
+  // Keeps the first part of each origin; false where there was one already.
+  bool add(Part part);
+  const Part* find(WorldId origin) const;
+
+  // Everything that component leads to, as far as the parts at hand go.
+  Closure close(Key from) const;
+
+  // Bodies and contacts of all components of a closed island.
+  BodySet assemble(const Closure& closure) const;
+
+ private:
+  struct Indexed {
+    Part part;
+    std::unordered_map<BodyId, std::uint32_t> holder;           // body -> component
+    std::unordered_multimap<BodyId, std::uint32_t> port_users;  // port -> components
+  };
+  const Neighbourhood& neighbourhood_;
+  std::map<WorldId, Indexed> parts_;
+};
+
+}  // namespace soda::border

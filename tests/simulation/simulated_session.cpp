@@ -1,0 +1,182 @@
+#include "tests/simulation/simulated_session.h"
+
+#include <cstdio>
+#include <memory>
+#include <queue>
+#include <random>
+
+#include "server/physics/model.h"
+
+namespace soda::test {
+namespace {
+
+class Digests : public border::Observer {
+ public:
+  void finalised(Step step, const BodySet& produced, std::uint64_t hash) override {
+    if (step != static_cast<Step>(steps.size())) out_of_order = true;
+    steps.push_back({produced.bodies.size(), hash});
+  }
+  std::vector<StepDigest> steps;
+  bool out_of_order = false;
+};
+
+struct Flight {
+  std::uint64_t at, number;
+  WorldId to;
+  std::shared_ptr<std::vector<std::byte>> bytes;
+  bool operator<(const Flight& o) const { return at != o.at ? at > o.at : number > o.number; }  // earliest on top
+};
+
+void add(border::CoreStats& sum, const border::CoreStats& s) {
+  sum.steps += s.steps;
+  sum.syncs += s.syncs;
+  sum.mixed_islands += s.mixed_islands;
+  sum.arrived += s.arrived;
+  sum.departed += s.departed;
+  sum.wide_bodies += s.wide_bodies;
+  sum.messages_sent += s.messages_sent;
+  sum.bytes_sent += s.bytes_sent;
+  sum.frames_sent += s.frames_sent;
+  sum.frame_bodies_sent += s.frame_bodies_sent;
+  sum.parts_sent += s.parts_sent;
+  sum.messages_resent += s.messages_resent;
+  sum.duplicates += s.duplicates;
+  sum.refused += s.refused;
+}
+
+class Session {
+ public:
+  Session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
+          const std::vector<WorldId>& owner)
+      : model_(scene), network_(network), random_(network.seed), digests_(worlds), slowness_(worlds) {
+    const Grid grid = make_grid(scene);
+    map_ = owner.empty() ? bisect(scene, grid, worlds) : TerritoryMap{grid, worlds, owner};
+    for (WorldId w = 0; w < worlds; ++w) {
+      cores_.push_back(std::make_unique<border::WorldCore>(
+          model_, map_, border::CoreSettings{.me = w, .epoch = 1, .session = 42, .last_step = steps}, digests_[w]));
+      slowness_[w] = uniform() * network.stall_share;
+    }
+    for (const auto& core : cores_) result_.least_neighbours += core->neighbours().size();
+  }
+
+  SessionResult run() {
+    std::uint64_t idle_since = 0;
+    std::vector<border::Progress> progress(cores_.size(), border::Progress::kWorked);
+    // Without any delivery or work for this long a world asks again, as a daemon does after a while.
+    const std::uint64_t patience = 40ull * static_cast<std::uint64_t>(network_.delay + 1);
+    for (std::uint64_t now = 0;; ++now) {
+      bool moved = false;
+      for (; !flights_.empty() && flights_.top().at <= now; flights_.pop()) {
+        const Flight& f = flights_.top();
+        if (!cores_[f.to]->receive(*f.bytes)) return fail("refused: " + cores_[f.to]->last_refusal());
+        ++result_.delivered;
+      }
+      bool done = true;
+      for (WorldId w = 0; w < cores_.size(); ++w) {
+        if (uniform() < slowness_[w]) {
+          done = false;
+          continue;
+        }
+        progress[w] = cores_[w]->work();
+        moved = moved || progress[w] == border::Progress::kWorked;
+        done = done && progress[w] == border::Progress::kDone;
+        for (border::Outgoing& out : cores_[w]->take_outgoing()) post(now, out);
+      }
+      if (done && flights_.empty()) break;
+      if (moved || !flights_.empty()) idle_since = now;
+      if (now - idle_since > patience) {
+        // Only a lost message can bring everything to rest.
+        if (result_.lost == 0 || ++stuck_ > 10000) return fail(standstill());
+        for (auto& core : cores_)
+          for (const WorldId n : core->waiting_for()) core->reconnect(n);
+        idle_since = now;
+      }
+    }
+    for (WorldId w = 0; w < cores_.size(); ++w) {
+      if (digests_[w].out_of_order) return fail("final steps out of order");
+      result_.steps.resize(digests_[w].steps.size());
+      for (std::size_t t = 0; t < result_.steps.size(); ++t) {
+        result_.steps[t].bodies += digests_[w].steps[t].bodies;
+        result_.steps[t].hash += digests_[w].steps[t].hash;
+      }
+    }
+    return collect();
+  }
+
+ private:
+  double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
+
+  void post(std::uint64_t now, border::Outgoing& out) {
+    const auto bytes = std::make_shared<std::vector<std::byte>>(std::move(out.bytes));
+    if (uniform() < network_.loss_share) {
+      ++result_.lost;
+      return;
+    }
+    int copies = 1;
+    if (uniform() < network_.double_share) ++copies, ++result_.doubled;
+    for (int i = 0; i < copies; ++i) {
+      double delay = uniform() * network_.delay;
+      if (uniform() < network_.slow_share) delay *= 10;
+      flights_.push({now + 1 + static_cast<std::uint64_t>(delay), ++number_, out.to, bytes});
+    }
+  }
+
+  std::string standstill() const {
+    std::string s = "standstill, no message on its way:";
+    for (WorldId w = 0; w < cores_.size(); ++w) {
+      s += " world " + std::to_string(w) + " clock " + std::to_string(cores_[w]->clock()) + " final " +
+           std::to_string(cores_[w]->final_step()) + " waits for";
+      for (const WorldId n : cores_[w]->waiting_for()) s += " " + std::to_string(n);
+      s += ";";
+    }
+    return s;
+  }
+
+  SessionResult fail(std::string why) {
+    result_.failure = "seed " + std::to_string(network_.seed) + ": " + std::move(why);
+    return collect();
+  }
+
+  SessionResult collect() {
+    for (const auto& core : cores_) add(result_.total, core->stats());
+    return result_;
+  }
+
+  physics::Model model_;
+  NetworkSettings network_;
+  TerritoryMap map_;
+  std::mt19937_64 random_;
+  std::vector<Digests> digests_;
+  std::vector<std::unique_ptr<border::WorldCore>> cores_;
+  std::vector<double> slowness_;
+  std::priority_queue<Flight> flights_;
+  std::uint64_t number_ = 0, stuck_ = 0;
+  SessionResult result_;
+};
+
+}  // namespace
+
+std::vector<StepDigest> run_single(const Scene& scene, Step steps) {
+  return Session(scene, 1, steps, {}, {}).run().steps;
+}
+
+SessionResult run_session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
+                          const std::vector<WorldId>& owner) {
+  return Session(scene, worlds, steps, network, owner).run();
+}
+
+std::string first_difference(const std::vector<StepDigest>& expected, const std::vector<StepDigest>& got) {
+  for (std::size_t t = 0; t < std::max(expected.size(), got.size()); ++t) {
+    if (t >= expected.size() || t >= got.size())
+      return "step " + std::to_string(t) + ": only one of the runs has it";
+    if (expected[t] == got[t]) continue;
+    char text[160];
+    std::snprintf(text, sizeof text, "step %zu: %zu bodies %016lx, expected %zu bodies %016lx", t, got[t].bodies,
+                  static_cast<unsigned long>(got[t].hash), expected[t].bodies,
+                  static_cast<unsigned long>(expected[t].hash));
+    return text;
+  }
+  return {};
+}
+
+}  // namespace soda::test

@@ -1,0 +1,48 @@
+// Several worlds in one process under a simulated network: a seeded scheduler delays, reorders, doubles and loses
+// messages and stalls worlds. One seed is one run, exactly. Every final step is compared with the single world's.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/scene/scene.h"
+#include "server/border/world_core.h"
+
+namespace soda::test {
+
+struct StepDigest {
+  std::size_t bodies = 0;
+  std::uint64_t hash = 0;
+  bool operator==(const StepDigest&) const = default;
+};
+
+struct NetworkSettings {
+  std::uint64_t seed = 1;
+  int delay = 5;               // ticks, at most, for an ordinary message
+  double slow_share = 0.05;    // of messages that take up to ten times as long: reordering
+  double double_share = 0.05;  // of messages that arrive twice
+  double loss_share = 0;       // of messages that never arrive; the sender is told nothing
+  double stall_share = 0.5;    // of ticks in which a world does nothing
+};
+
+struct SessionResult {
+  std::vector<StepDigest> steps;  // summed over the worlds, by step
+  border::CoreStats total;        // likewise
+  std::uint64_t lost = 0, doubled = 0, delivered = 0;
+  std::size_t least_neighbours = 0;
+  std::string failure;  // empty: all worlds made the last step final
+};
+
+// The reference: one world, no network.
+std::vector<StepDigest> run_single(const Scene& scene, Step steps);
+
+// The session on `worlds` worlds. `owner` overrides the territories (by Grid::index) where not empty.
+SessionResult run_session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
+                          const std::vector<WorldId>& owner = {});
+
+// "step 17: ..." for the first step that differs, empty where none does.
+std::string first_difference(const std::vector<StepDigest>& expected, const std::vector<StepDigest>& got);
+
+}  // namespace soda::test
