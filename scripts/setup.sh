@@ -8,7 +8,7 @@ packages=(
   libbullet-dev libeigen3-dev                               # physics: shapes and narrow phase; vectors
   libfastrtps-dev libfastcdr-dev fastddsgen                 # Fast DDS and its IDL compiler
   libprotobuf-dev protobuf-compiler                         # scene files
-  libsdformat-dev libassimp-dev                             # SDF worlds and meshes
+  libsdformat-dev libassimp-dev libtinyxml2-dev             # SDF worlds and meshes
   libspdlog-dev libcli11-dev libxxhash-dev libzstd-dev      # logs, options, hashes, compression
   libgtest-dev libbenchmark-dev                             # tests and micro-benchmarks
   gnuplot-nox                                               # pictures

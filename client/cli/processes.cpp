@@ -42,6 +42,8 @@ struct Processes::Process {
   }
 };
 
+Processes::Processes(LineHandler on_line) : on_line_(std::move(on_line)) {}
+
 Processes::~Processes() { stop(std::chrono::seconds(2)); }
 
 void Processes::start(const std::string& name, const std::string& program, const std::vector<std::string>& arguments,

@@ -25,7 +25,7 @@ class Processes {
  public:
   // `on_line` gets each line that a process writes to its standard output and error.
   using LineHandler = std::function<void(const std::string& name, const std::string& line)>;
-  explicit Processes(LineHandler on_line) : on_line_(std::move(on_line)) {}
+  explicit Processes(LineHandler on_line);
   ~Processes();  // ends what still runs, hard if need be
   Processes(const Processes&) = delete;
   Processes& operator=(const Processes&) = delete;

@@ -42,15 +42,18 @@ std::string counted(std::size_t n, const char* one, const char* many) {
 }
 
 std::string list_shapes(const std::array<std::size_t, std::variant_size_v<Geometry>>& counts) {
-  constexpr std::pair<const char*, const char*> kNames[] = {
-      {"sphere", "spheres"},           {"box", "boxes"},   {"capsule", "capsules"},       {"cylinder", "cylinders"},
-      {"convex hull", "convex hulls"}, {"plane", "planes"}, {"triangle mesh", "triangle meshes"},
-      {"height field", "height fields"}};
+  constexpr std::pair<const char*, const char*> kNames[] = {{"sphere", "spheres"},
+                                                            {"box", "boxes"},
+                                                            {"capsule", "capsules"},
+                                                            {"cylinder", "cylinders"},
+                                                            {"convex hull", "convex hulls"},
+                                                            {"plane", "planes"},
+                                                            {"triangle mesh", "triangle meshes"},
+                                                            {"height field", "height fields"}};
   static_assert(std::size(kNames) == std::variant_size_v<Geometry>);
   std::string text;
   for (std::size_t k = 0; k < counts.size(); ++k)
-    if (counts[k] > 0)
-      text += (text.empty() ? "" : ", ") + counted(counts[k], kNames[k].first, kNames[k].second);
+    if (counts[k] > 0) text += (text.empty() ? "" : ", ") + counted(counts[k], kNames[k].first, kNames[k].second);
   return text.empty() ? "none" : text;
 }
 
@@ -73,8 +76,10 @@ std::vector<std::string> doubts(const Scene& scene) {
     if (m[0] + m[1] < m[2] * (1 - 1e-6) && impossible++ == 0) first = &body;
   }
   if (impossible > 0)
-    list.push_back(counted(impossible, "body has", "bodies have") + " an inertia that no solid body has: one principal "
-                   "moment exceeds the sum of the others (first: " + label_of(*first) + ")");
+    list.push_back(counted(impossible, "body has", "bodies have") +
+                   " an inertia that no solid body has: one principal "
+                   "moment exceeds the sum of the others (first: " +
+                   label_of(*first) + ")");
   return list;
 }
 
@@ -113,14 +118,15 @@ void print_summary(const Scene& scene, const std::string& file) {
   std::printf("  step            %.9g s, %u sub-steps, sleeping %s, at most %.6g m/s\n", scene.dt, scene.substeps,
               scene.sleeping ? "on" : "off", scene.max_speed);
   const Grid grid = make_grid(scene);
-  std::printf("  territory grid  %d x %d x %d cells of %.6g m (%s)\n", grid.size[0], grid.size[1], grid.size[2], grid.edge,
-              scene.territory_cell > 0 ? "given" : "chosen from the bodies");
+  std::printf("  territory grid  %d x %d x %d cells of %.6g m (%s)\n", grid.size[0], grid.size[1], grid.size[2],
+              grid.edge, scene.territory_cell > 0 ? "given" : "chosen from the bodies");
   for (const std::string& doubt : doubts(scene)) std::printf("  note: %s\n", doubt.c_str());
 }
 
 std::string generator_help() {
   std::string text = "Generators:";
-  for (const Generator& g : generators()) text += "\n  " + std::string(g.name) + std::string(10 - std::string(g.name).size(), ' ') + g.summary;
+  for (const Generator& g : generators())
+    text += "\n  " + std::string(g.name) + std::string(10 - std::string(g.name).size(), ' ') + g.summary;
   return text;
 }
 
@@ -176,9 +182,8 @@ void add_scene_command(CLI::App& app, int& exit_code) {
   const auto checked = std::make_shared<std::string>();
   CLI::App* check = scene->add_subcommand("check", "Check a scene and say what is in it");
   check->add_option("FILE", *checked, "Scene: .sdf, .world, .txtpb or .scene")->required();
-  check->callback([checked, &exit_code] {
-    guarded(exit_code, [&] { print_summary(load_and_warn(*checked), *checked); });
-  });
+  check->callback(
+      [checked, &exit_code] { guarded(exit_code, [&] { print_summary(load_and_warn(*checked), *checked); }); });
 }
 
 }  // namespace soda

@@ -6,7 +6,8 @@
 
 namespace soda {
 
-Scene load_any_scene(const std::filesystem::path& path, const ProgressFn& progress, std::vector<std::string>& warnings) {
+Scene load_any_scene(const std::filesystem::path& path, const ProgressFn& progress,
+                     std::vector<std::string>& warnings) {
   const std::string extension = path.extension().string();
   if (extension == ".sdf" || extension == ".world") {
     SdfOptions options;

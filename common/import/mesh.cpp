@@ -78,9 +78,9 @@ Geometry load_mesh(const MeshRequest& request, std::vector<std::filesystem::path
     }
   }
   if (mesh.triangles.empty())
-    throw std::runtime_error((request.submesh.empty() ? "the mesh has no triangles: "
-                                                      : "there is no mesh \"" + request.submesh + "\" in ") +
-                             request.file.string());
+    throw std::runtime_error(
+        (request.submesh.empty() ? "the mesh has no triangles: " : "there is no mesh \"" + request.submesh + "\" in ") +
+        request.file.string());
   if (request.centre_submesh) {
     Vec3 low = mesh.vertices[0], high = low;
     for (const Vec3& v : mesh.vertices) low = low.cwiseMin(v), high = high.cwiseMax(v);
@@ -93,7 +93,8 @@ Geometry load_mesh(const MeshRequest& request, std::vector<std::filesystem::path
   for (const Vec3& v : mesh.vertices)
     if (!v.allFinite()) throw std::runtime_error("a vertex is not finite in " + request.file.string());
   ConvexHull hull{hull_corners(std::move(mesh.vertices))};
-  if (hull.points.empty()) throw std::runtime_error("the mesh is flat, it has no convex hull: " + request.file.string());
+  if (hull.points.empty())
+    throw std::runtime_error("the mesh is flat, it has no convex hull: " + request.file.string());
   return hull;
 }
 

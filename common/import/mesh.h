@@ -13,7 +13,8 @@ struct MeshRequest {
   std::filesystem::path file;
   Vec3 scale = Vec3::Ones();
   bool convex = false;  // the convex hull, else the triangles
-  // One mesh of the file by its name, empty for all; `centre_submesh` moves the middle of its bounding box to the origin.
+  // One mesh of the file by its name, empty for all; `centre_submesh` moves the middle of its bounding box to the
+  // origin.
   std::string submesh;
   bool centre_submesh = false;
 };

@@ -95,7 +95,8 @@ void tidy(const fs::path& folder) {
 }  // namespace
 
 fs::path SdfCache::folder() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache == '/') return fs::path(cache) / "soda" / "sdf";
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache == '/')
+    return fs::path(cache) / "soda" / "sdf";
   if (const char* home = std::getenv("HOME"); home && *home == '/') return fs::path(home) / ".cache" / "soda" / "sdf";
   return {};
 }

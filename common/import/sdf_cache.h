@@ -14,10 +14,10 @@ struct Converted {
   std::vector<std::string> warnings;
 };
 
-// For one SDF file. Two kinds of files: `<hash of the SDF>.deps` lists what the SDF refers to, as found when it was last
-// converted; `<hash of the SDF, that list and all content>.scene.zst` is the result. An entry is used only when every file in
-// the list has the content that it had, so a changed mesh, a moved one or another folder with a file of the same name is
-// always noticed.
+// For one SDF file. Two kinds of files: `<hash of the SDF>.deps` lists what the SDF refers to, as found when it was
+// last converted; `<hash of the SDF, that list and all content>.scene.zst` is the result. An entry is used only when
+// every file in the list has the content that it had, so a changed mesh, a moved one or another folder with a file of
+// the same name is always noticed.
 class SdfCache {
  public:
   // `sdf` is the content of the file at `path`.

@@ -52,7 +52,8 @@ class TakingApart {
   TakingApart(const std::string& text, const std::string& source, const fs::path& base) : source_(source), base_(base) {
     if (xml_.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
       // tinyxml2's own text repeats the line number; its name of the error is what helps.
-      throw SceneError(source_, "", "", std::string("is not well-formed XML: ") + xml_.ErrorName(), xml_.ErrorLineNum());
+      throw SceneError(source_, "", "", std::string("is not well-formed XML: ") + xml_.ErrorName(),
+                       xml_.ErrorLineNum());
     }
   }
 
@@ -226,7 +227,8 @@ fs::path resolve_uri(const std::string& uri, const fs::path& base) {
 
 std::string resource_paths() {
   std::string all;
-  for (const char* variable : kResourcePaths) all += std::string(std::getenv(variable) ? std::getenv(variable) : "") + "\n";
+  for (const char* variable : kResourcePaths)
+    all += std::string(std::getenv(variable) ? std::getenv(variable) : "") + "\n";
   return all;
 }
 

@@ -1,7 +1,7 @@
-// An SDF file taken apart before libsdformat sees it. libsdformat's time grows with the square of the models in one world,
-// and it reads each model although most worlds repeat a few. So models that nothing refers to and that refer to nothing
-// outside (nearly all) are taken out of the world and read once for all that are the same but for name and pose; what is
-// left goes to libsdformat as it is.
+// An SDF file taken apart before libsdformat sees it. libsdformat's time grows with the square of the models in one
+// world, and it reads each model although most worlds repeat a few. So models that nothing refers to and that refer to
+// nothing outside (nearly all) are taken out of the world and read once for all that are the same but for name and
+// pose; what is left goes to libsdformat as it is.
 #pragma once
 
 #include <filesystem>
@@ -27,11 +27,11 @@ struct SdfTemplate {
 struct SdfEntry {
   enum class Kind { kInstance, kPopulation, kInRest };
   Kind kind = Kind::kInstance;
-  std::string name;            // not known for kInRest
+  std::string name;  // not known for kInRest
   int line = 0;
-  std::size_t model = 0;       // index of the template; of kInRest: which model of the rest
-  std::optional<Pose> pose;    // kInstance: as given
-  SdfPopulation population;    // kPopulation
+  std::size_t model = 0;     // index of the template; of kInRest: which model of the rest
+  std::optional<Pose> pose;  // kInstance: as given
+  SdfPopulation population;  // kPopulation
 };
 
 struct SdfDocument {

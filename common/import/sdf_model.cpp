@@ -80,7 +80,8 @@ ConvertedModel SdfModelConverter::convert(const sdf::Model& model, std::size_t u
   bodies_.clear();
   ConvertedModel result;
   ignition::math::Pose3d in_world;
-  for (const sdf::Error& e : model.SemanticPose().Resolve(in_world)) fail("model \"" + top_ + "\"", "pose", e.Message());
+  for (const sdf::Error& e : model.SemanticPose().Resolve(in_world))
+    fail("model \"" + top_ + "\"", "pose", e.Message());
   result.pose = pose_of(in_world);
   if (!model.PlacementFrameName().empty())
     result.placement = compose(inverse(pose_of(model.SemanticPose().RawPose())), result.pose);
@@ -126,7 +127,8 @@ void SdfModelConverter::add_model(const sdf::Model& model, const std::string& sc
   }
 }
 
-void SdfModelConverter::add_link(const sdf::Link& link, const std::string& name, const Pose& model_pose, bool is_static) {
+void SdfModelConverter::add_link(const sdf::Link& link, const std::string& name, const Pose& model_pose,
+                                 bool is_static) {
   const std::string place = "link \"" + top_ + "::" + name + "\"";
   if (link.CollisionCount() == 0) {
     warnings_.add("a <link> without a <collision> is left out: nothing could touch it", top_ + "::" + name, uses_);
@@ -180,7 +182,8 @@ std::uint32_t SdfModelConverter::read_geometry(const sdf::Geometry& geometry, co
       const Vec3 radii = vec3_of(geometry.EllipsoidShape()->Radii());
       for (int axis = 0; axis < 3; ++axis)
         if (!(radii[axis] >= kMinSize && radii[axis] <= kMaxSize))
-          fail(place, field + ".ellipsoid.radii", "must be between 1e-05 and 1e+07 m, is " + std::to_string(radii[axis]));
+          fail(place, field + ".ellipsoid.radii",
+               "must be between 1e-05 and 1e+07 m, is " + std::to_string(radii[axis]));
       warnings_.add("an <ellipsoid> becomes the convex hull of 178 points of its surface", place, uses_);
       return builder_.geometry(ellipsoid(radii));
     }
@@ -192,7 +195,8 @@ std::uint32_t SdfModelConverter::read_geometry(const sdf::Geometry& geometry, co
     case sdf::GeometryType::MESH:
       return read_mesh(*geometry.MeshShape(), place, field + ".mesh", is_static);
     case sdf::GeometryType::HEIGHTMAP:
-      fail(place, field + ".heightmap", "heightmap images are not read; use a mesh, or a height_field in a .txtpb scene");
+      fail(place, field + ".heightmap",
+           "heightmap images are not read; use a mesh, or a height_field in a .txtpb scene");
     default:
       break;
   }
@@ -250,10 +254,12 @@ void SdfModelConverter::read_surface(const sdf::Collision& collision, const std:
     }
   }
   if (friction > kMaxFriction) {
-    warnings_.add("a friction above " + std::to_string(static_cast<int>(kMaxFriction)) + " is taken as that", name, uses_);
+    warnings_.add("a friction above " + std::to_string(static_cast<int>(kMaxFriction)) + " is taken as that", name,
+                  uses_);
     friction = kMaxFriction;
   }
-  if (const sdf::ElementPtr e = child(child(surface, "bounce"), "restitution_coefficient")) restitution = e->Get<double>();
+  if (const sdf::ElementPtr e = child(child(surface, "bounce"), "restitution_coefficient"))
+    restitution = e->Get<double>();
   if (first) {
     body.friction = friction;
     body.restitution = restitution;

@@ -30,7 +30,11 @@ class SdfModelConverter {
  public:
   // Geometry goes into the builder's table. `source` and `base` are the SDF file and its folder.
   SdfModelConverter(SceneBuilder& builder, Warnings& warnings, std::string source, std::filesystem::path base)
-      : builder_(builder), warnings_(warnings), source_(std::move(source)), base_(std::move(base)), masses_(builder.scene) {}
+      : builder_(builder),
+        warnings_(warnings),
+        source_(std::move(source)),
+        base_(std::move(base)),
+        masses_(builder.scene) {}
 
   // `uses`: how often warnings count. Throws SceneError.
   ConvertedModel convert(const sdf::Model& model, std::size_t uses);

@@ -85,7 +85,9 @@ std::vector<Vec3> random_offsets(const SdfPopulation& p, double radius, Warnings
           break;
         }
     }
-    if (!clear) warnings.add("some models of a <population> overlap, because its region is small", "population \"" + p.name + "\"");
+    if (!clear)
+      warnings.add("some models of a <population> overlap, because its region is small",
+                   "population \"" + p.name + "\"");
     offsets.push_back(at);
   }
   return offsets;
@@ -181,7 +183,8 @@ std::vector<Pose> places(const SdfPopulation& p, double model_radius, Warnings& 
         offsets.emplace_back((static_cast<double>(column) - 0.5 * static_cast<double>(p.columns - 1)) * p.step.x(),
                              (static_cast<double>(row) - 0.5 * static_cast<double>(p.rows - 1)) * p.step.y(), 0);
   } else if (p.rule == Rule::kUniform) {
-    // A square grid with about the region's proportions; in a cylinder, by rings (Vogel's spiral), which fills a disc evenly.
+    // A square grid with about the region's proportions; in a cylinder, by rings (Vogel's spiral), which fills a disc
+    // evenly.
     if (p.box) {
       const double ratio = size.y() > 0 ? size.x() / size.y() : static_cast<double>(p.count);
       const double wanted = std::sqrt(static_cast<double>(p.count) * ratio);
@@ -190,7 +193,8 @@ std::vector<Pose> places(const SdfPopulation& p, double model_radius, Warnings& 
       const std::size_t rows = (p.count + columns - 1) / columns;
       for (std::size_t i = 0; i < p.count; ++i)
         offsets.emplace_back(size.x() * ((static_cast<double>(i % columns) + 0.5) / static_cast<double>(columns) - 0.5),
-                             size.y() * ((static_cast<double>(i / columns) + 0.5) / static_cast<double>(rows) - 0.5), 0);
+                             size.y() * ((static_cast<double>(i / columns) + 0.5) / static_cast<double>(rows) - 0.5),
+                             0);
     } else {
       constexpr double kGoldenAngle = 2.399963229728653;  // rad
       for (std::size_t i = 0; i < p.count; ++i) {

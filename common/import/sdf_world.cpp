@@ -1,3 +1,6 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <sdf/sdf.hh>
 #include <set>
@@ -16,6 +19,28 @@ namespace fs = std::filesystem;
 
 // Models that libsdformat reads at once: it needs 50 ms for any document, and time grows with the square of its models.
 constexpr std::size_t kBatch = 48;
+
+// Whatever libsdformat cannot read it takes for URDF, whose parser complains of that on standard error: noise before
+// our message. Keeps standard error away from the whole process while it lives (the soda command has no other threads
+// here).
+class QuietStandardError {
+ public:
+  QuietStandardError() : kept_(::dup(STDERR_FILENO)) {
+    const int nowhere = ::open("/dev/null", O_WRONLY);
+    if (kept_ >= 0 && nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
+    if (nowhere >= 0) ::close(nowhere);
+  }
+  ~QuietStandardError() {
+    if (kept_ < 0) return;
+    ::dup2(kept_, STDERR_FILENO);
+    ::close(kept_);
+  }
+  QuietStandardError(const QuietStandardError&) = delete;
+  QuietStandardError& operator=(const QuietStandardError&) = delete;
+
+ private:
+  int kept_;
+};
 
 class WorldConverter {
  public:
@@ -48,9 +73,10 @@ class WorldConverter {
     if (progress_) progress_(done, total);
   }
 
-  // The first error of libsdformat, if any. Its positions are those of our excerpts, so they are left out.
-  static std::string first_error(const sdf::Errors& errors) {
-    for (const sdf::Error& e : errors)
+  // Returns the first error of libsdformat, if any. Its positions are those of our excerpts, so they are left out.
+  std::string read(sdf::Root& root, const std::string& text) const {
+    const QuietStandardError quiet;
+    for (const sdf::Error& e : root.LoadSdfString(text, config_))
       if (e.Code() != sdf::ErrorCode::NONE) return e.Message();
     return {};
   }
@@ -61,7 +87,7 @@ class WorldConverter {
     scene.gravity = Vec3(0, 0, -9.8);  // SDF's default
     if (document_.rest.empty()) return;
     sdf::Root root;
-    const std::string error = first_error(root.LoadSdfString(document_.rest, config_));
+    const std::string error = read(root, document_.rest);
     if (!error.empty()) throw SceneError(source_, "", "world", error);
     const sdf::World& world = *root.WorldByIndex(0);
     if (!world.Name().empty()) scene.name = world.Name();
@@ -108,7 +134,7 @@ class WorldConverter {
 
   void read_batch(std::size_t first, std::size_t last) {
     sdf::Root root;
-    const std::string error = first_error(root.LoadSdfString(excerpt(first, last), config_));
+    const std::string error = read(root, excerpt(first, last));
     const SdfTemplate& head = document_.templates[first];
     if (!error.empty() && last - first == 1)
       throw SceneError(source_, "model \"" + head.name + "\"", "", error, head.line);
@@ -159,7 +185,8 @@ class WorldConverter {
       body.name = name + "::" + part.name;
       body.pose = pose * part.pose;
       const double squared = body.pose.orientation.squaredNorm();
-      if (squared > 1e-12 && !(std::abs(squared - 1) <= 1e-12)) body.pose.orientation = normalized(body.pose.orientation);
+      if (squared > 1e-12 && !(std::abs(squared - 1) <= 1e-12))
+        body.pose.orientation = normalized(body.pose.orientation);
       builder_.scene.bodies.push_back(std::move(body));
     }
   }

@@ -31,8 +31,8 @@ bool same_direction(const Int3& a, const Int3& b) {
     const int j = (i + 1) % 3;
     if (static_cast<__int128>(a[i]) * b[j] != static_cast<__int128>(a[j]) * b[i]) return false;
   }
-  const __int128 along = static_cast<__int128>(a[0]) * b[0] + static_cast<__int128>(a[1]) * b[1] +
-                         static_cast<__int128>(a[2]) * b[2];
+  const __int128 along =
+      static_cast<__int128>(a[0]) * b[0] + static_cast<__int128>(a[1]) * b[1] + static_cast<__int128>(a[2]) * b[2];
   return along > 0;
 }
 
@@ -104,7 +104,8 @@ class Builder {
     const std::uint32_t c = largest([&](const Int3& p) { return squared_length(cross(at_[b] - at_[a], p - at_[a])); });
     if (c == kNone) return false;
     const Int3 normal = cross(at_[b] - at_[a], at_[c] - at_[a]);
-    const std::uint32_t d = largest([&](const Int3& p) { return static_cast<__int128>(std::llabs(dot(normal, p - at_[a]))); });
+    const std::uint32_t d =
+        largest([&](const Int3& p) { return static_cast<__int128>(std::llabs(dot(normal, p - at_[a]))); });
     if (d == kNone) return false;
     std::array<std::uint32_t, 4> t{a, b, c, d};
     if (dot(normal, at_[d] - at_[a]) > 0) std::swap(t[1], t[2]);
@@ -172,7 +173,8 @@ class Builder {
         if (p != point) orphans.push_back(p);
       std::vector<std::uint32_t>().swap(face.outside);
     }
-    // The outline is one closed loop; put its edges in order, so that neighbours in the cone are neighbours in the list.
+    // The outline is one closed loop; put its edges in order, so that neighbours in the cone are neighbours in the
+    // list.
     std::sort(outline.begin(), outline.end(), [](const Edge& l, const Edge& r) { return l.from < r.from; });
     std::vector<Edge> loop{outline[0]};
     while (loop.size() < outline.size())
@@ -189,8 +191,8 @@ class Builder {
     for (std::uint32_t p : orphans) assign(p, first);
   }
 
-  // A point of a convex polyhedron lies in one of its planes if it is inside a face, in two if inside an edge, in more if
-  // it is a corner.
+  // A point of a convex polyhedron lies in one of its planes if it is inside a face, in two if inside an edge, in more
+  // if it is a corner.
   std::vector<std::uint32_t> true_corners() const {
     std::vector<std::vector<std::uint32_t>> around(at_.size());
     for (std::uint32_t f = 0; f < faces_.size(); ++f)
@@ -221,7 +223,8 @@ class Builder {
 HullMesh convex_hull(std::span<const Vec3> points) { return Builder(points).build(); }
 
 std::vector<Vec3> hull_corners(std::vector<Vec3> points) {
-  // Dropping points may move the corner of the bounding box, and so the rounding, by a hair: repeat until nothing changes.
+  // Dropping points may move the corner of the bounding box, and so the rounding, by a hair: repeat until nothing
+  // changes.
   for (;;) {
     const HullMesh mesh = convex_hull(points);
     if (mesh.corners.size() == points.size()) return points;

@@ -24,8 +24,8 @@ struct HullMesh {
 // The points must be finite.
 HullMesh convex_hull(std::span<const Vec3> points);
 
-// The corners alone, in their given order. Taking the hull of the result again changes nothing. Empty when the points lie
-// in one plane.
+// The corners alone, in their given order. Taking the hull of the result again changes nothing. Empty when the points
+// lie in one plane.
 std::vector<Vec3> hull_corners(std::vector<Vec3> points);
 
 }  // namespace soda

@@ -19,8 +19,8 @@ std::uint32_t square_side(std::uint32_t count) {
 }
 
 std::uint32_t colour(std::uint32_t n) {
-  constexpr std::uint32_t kPalette[] = {0xd1603dff, 0x3d7ea6ff, 0x6a994eff, 0xe9b44cff, 0x8e6c8aff,
-                                        0x5c9eadff, 0xbc4749ff, 0x7f8c8dff};
+  constexpr std::uint32_t kPalette[] = {0xd1603dff, 0x3d7ea6ff, 0x6a994eff, 0xe9b44cff,
+                                        0x8e6c8aff, 0x5c9eadff, 0xbc4749ff, 0x7f8c8dff};
   return kPalette[n % std::size(kPalette)];
 }
 
@@ -28,7 +28,8 @@ double ground_edge(double width) { return std::max(200.0, width + 60); }
 
 namespace {
 
-constexpr double kNear = 1.7320508075688772 + 0.02;  // m: unit cubes further apart than this cannot touch, however turned
+constexpr double kNear =
+    1.7320508075688772 + 0.02;  // m: unit cubes further apart than this cannot touch, however turned
 
 // Where bodies are already, for placing them at random without overlap.
 class Occupied {
@@ -70,11 +71,11 @@ void add_room(SceneBuilder& builder, const Vec3& low, const Vec3& high, double f
     }
 }
 
-// The experiment of the SODA paper (section 4.1): cubes homogeneously, randomly distributed in a space, while their number,
-// and so the density, grows. The paper has "24000 km3" and "cubes of 100 cm3"; we read 24,000 m^3 and cubes of 100 cm =
-// 1 m, with which a few hundred bodies meet each other at all. Up to 2,400 cubes the space is 40 x 30 x 20 m; beyond, it
-// grows at that density (a tenth full), for they would not find room otherwise. The cubes fly about without gravity,
-// at up to 4 m/s, in a closed room, so that they stay homogeneously distributed.
+// The experiment of the SODA paper (section 4.1): cubes homogeneously, randomly distributed in a space, while their
+// number, and so the density, grows. The paper has "24000 km3" and "cubes of 100 cm3"; we read 24,000 m^3 and cubes of
+// 100 cm = 1 m, with which a few hundred bodies meet each other at all. Up to 2,400 cubes the space is 40 x 30 x 20 m;
+// beyond, it grows at that density (a tenth full), for they would not find room otherwise. The cubes fly about without
+// gravity, at up to 4 m/s, in a closed room, so that they stay homogeneously distributed.
 void cubes(SceneBuilder& builder, Random& random, std::uint32_t count) {
   constexpr std::uint32_t kDensest = 2400;
   builder.scene.gravity = Vec3::Zero();
@@ -99,8 +100,9 @@ void cubes(SceneBuilder& builder, Random& random, std::uint32_t count) {
 
 // Boxes and spheres in turn, .3 to .6 m, dropped in layers into one pit of 8 x 8 m.
 void heap(SceneBuilder& builder, Random& random, std::uint32_t count) {
-  constexpr double kPit = 8, kPitch = 0.66, kFirstLayer = 0.5;  // m; the pitch has room for a .6 m box that is tilted a little
-  constexpr std::uint32_t kSide = 12;                           // 12 * .66 m < 8 m
+  constexpr double kPit = 8, kPitch = 0.66,
+                   kFirstLayer = 0.5;  // m; the pitch has room for a .6 m box that is tilted a little
+  constexpr std::uint32_t kSide = 12;  // 12 * .66 m < 8 m
   const double height = kFirstLayer + kPitch * (divide_up(count, kSide * kSide) + 1);
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t layer = i / (kSide * kSide), row = i / kSide % kSide, column = i % kSide;
@@ -126,7 +128,8 @@ void heap(SceneBuilder& builder, Random& random, std::uint32_t count) {
     }
 }
 
-// Eight bunches of .5 m boxes, loosely packed, fly from the corners of a cube to its middle and meet there, without gravity.
+// Eight bunches of .5 m boxes, loosely packed, fly from the corners of a cube to its middle and meet there, without
+// gravity.
 void cluster(SceneBuilder& builder, Random& random, std::uint32_t count) {
   constexpr std::uint32_t kBunches = 8;
   constexpr double kBox = 0.5, kPitch = 0.6, kSpeed = 5;  // m, m, m/s
@@ -186,7 +189,8 @@ struct Entry {
 };
 
 constexpr Entry kEntries[] = {
-    {{"cubes", "1 m cubes flying about in a closed room of 24,000 m^3 without gravity (the paper's experiment)"}, cubes},
+    {{"cubes", "1 m cubes flying about in a closed room of 24,000 m^3 without gravity (the paper's experiment)"},
+     cubes},
     {{"piles", "heaps of 27 tumbled .5 m boxes, 10 m apart"}, piles},
     {{"heap", "boxes and spheres dropped into one pit of 8 x 8 m"}, heap},
     {{"towers", "towers of ten 1 m boxes, 3 m apart"}, towers},
@@ -216,8 +220,8 @@ Scene generate(const std::string& name, std::uint32_t bodies, std::uint64_t seed
       continue;
     }
     if (bodies == 0 || bodies > kMaxGenerated)
-      throw std::invalid_argument("the number of bodies must be between 1 and " + std::to_string(kMaxGenerated) + ", is " +
-                                  std::to_string(bodies));
+      throw std::invalid_argument("the number of bodies must be between 1 and " + std::to_string(kMaxGenerated) +
+                                  ", is " + std::to_string(bodies));
     SceneBuilder builder(name);
     Random random(seed);
     entry.make(builder, random, bodies);

@@ -1,4 +1,5 @@
-// Scenes of any size from a name, a number of bodies and a seed. The same arguments give the same bytes on every machine.
+// Scenes of any size from a name, a number of bodies and a seed. The same arguments give the same bytes on every
+// machine.
 #pragma once
 
 #include <cstdint>

@@ -6,13 +6,13 @@
 namespace soda::generator {
 namespace {
 
-constexpr std::uint32_t kStack = 20;                              // slabs
+constexpr std::uint32_t kStack = 20;                                    // slabs
 constexpr double kBlock = 1.6, kStreet = 4, kPitch = kBlock + kStreet;  // m: a stack has a block of its own
-constexpr double kWalk = 1.4;                                     // m/s
-const Vec3 kPerson(0.6, 0.6, 0.8);                                // m, low enough not to topple when pushed
+constexpr double kWalk = 1.4;                                           // m/s
+const Vec3 kPerson(0.6, 0.6, 0.8);                                      // m, low enough not to topple when pushed
 
-// A place for a person, relative to the lower left corner of a block's share of the city (the block at its lower left, a
-// street right of it and one above it), and the way along which one walks there.
+// A place for a person, relative to the lower left corner of a block's share of the city (the block at its lower left,
+// a street right of it and one above it), and the way along which one walks there.
 struct Place {
   double x, y;
   bool along_x, along_y;
@@ -48,8 +48,8 @@ void add_stack(SceneBuilder& builder, Random& random, std::uint32_t slabs, const
 
 }  // namespace
 
-// Blocks on a square lattice, one stack each. People keep to the lanes: those in the lower or right half of a street walk
-// towards +x or +y, the others back, and at the city's edges they turn round.
+// Blocks on a square lattice, one stack each. People keep to the lanes: those in the lower or right half of a street
+// walk towards +x or +y, the others back, and at the city's edges they turn round.
 double add_city(SceneBuilder& builder, Random& random, std::uint32_t slabs, std::uint32_t people, const Vec3& middle) {
   static const std::vector<Place> places = places_of_block();
   const std::uint32_t per_block = 20;  // people; as many as slabs, so a city of equal parts is evenly filled

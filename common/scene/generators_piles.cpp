@@ -5,8 +5,8 @@
 
 namespace soda::generator {
 
-// Heaps of 27, the last one with the rest, on a square lattice. 3 x 3 x 3 boxes, turned at random, so far apart that none
-// touch (the pitch exceeds the diagonal of .866 m), fall from a hand's height.
+// Heaps of 27, the last one with the rest, on a square lattice. 3 x 3 x 3 boxes, turned at random, so far apart that
+// none touch (the pitch exceeds the diagonal of .866 m), fall from a hand's height.
 double add_piles(SceneBuilder& builder, Random& random, std::uint32_t count, const Vec3& middle) {
   constexpr std::uint32_t kPile = 27;
   constexpr double kBox = 0.5, kPitch = 0.9, kApart = 10;  // m
@@ -37,7 +37,8 @@ double add_towers(SceneBuilder& builder, std::uint32_t count, const Vec3& middle
   return kApart * side;
 }
 
-// Rows along x, of up to 200, 1 m apart. The first of each row turns about its lower edge at 2.5 rad/s, towards the next.
+// Rows along x, of up to 200, 1 m apart. The first of each row turns about its lower edge at 2.5 rad/s, towards the
+// next.
 double add_dominoes(SceneBuilder& builder, std::uint32_t count, const Vec3& middle) {
   constexpr std::uint32_t kRow = 200;
   constexpr double kSpacing = 0.25, kApart = 1, kPush = 2.5;  // m, m, rad/s
@@ -45,7 +46,8 @@ double add_dominoes(SceneBuilder& builder, std::uint32_t count, const Vec3& midd
   const std::uint32_t rows = divide_up(count, kRow), longest = std::min(count, kRow);
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t row = i / kRow, n = i % kRow;
-    const Vec3 at = middle + Vec3((n - 0.5 * (longest - 1)) * kSpacing, (row - 0.5 * (rows - 1)) * kApart, 0.5 * size.z());
+    const Vec3 at =
+        middle + Vec3((n - 0.5 * (longest - 1)) * kSpacing, (row - 0.5 * (rows - 1)) * kApart, 0.5 * size.z());
     Body& domino = builder.add(Box{size}, at, Quat::Identity(), 600);  // kg/m^3, wood
     domino.friction = 0.25;
     domino.colour = colour(n / 10);

@@ -112,7 +112,8 @@ Inertial MassTable::of(std::span<const Shape> shapes, std::span<const double> de
   } else {
     for (const Inertial& part : parts) sum.mass += part.mass, sum.centre += part.mass * part.centre;
     sum.centre /= sum.mass;
-    for (const Inertial& part : parts) sum.inertia += shifted_inertia(part.inertia, part.mass, part.centre - sum.centre);
+    for (const Inertial& part : parts)
+      sum.inertia += shifted_inertia(part.inertia, part.mass, part.centre - sum.centre);
   }
   sum.inertia = (0.5 * (sum.inertia + sum.inertia.transpose())).eval();  // symmetric to the bit
   return sum;

@@ -11,12 +11,12 @@ namespace soda {
 
 constexpr double kDefaultDensity = 1000;  // kg/m^3, water
 
-// Of a solid body of the given density (kg/m^3) in the geometry's own frame. Exact formulas; a convex hull is integrated
-// over its faces. Planes, meshes and height fields have no volume of their own: std::invalid_argument.
+// Of a solid body of the given density (kg/m^3) in the geometry's own frame. Exact formulas; a convex hull is
+// integrated over its faces. Planes, meshes and height fields have no volume of their own: std::invalid_argument.
 Inertial mass_of(const Geometry& geometry, double density);
 
-// Adds up the shapes of bodies. Keeps what it has worked out of each of the scene's geometries, because many bodies share
-// one and hulls are costly. The scene must outlive it; geometries may be appended meanwhile.
+// Adds up the shapes of bodies. Keeps what it has worked out of each of the scene's geometries, because many bodies
+// share one and hulls are costly. The scene must outlive it; geometries may be appended meanwhile.
 class MassTable {
  public:
   explicit MassTable(const Scene& scene) : scene_(scene) {}

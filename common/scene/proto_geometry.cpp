@@ -11,8 +11,8 @@ namespace {
 
 std::vector<Vec3> read_points(const google::protobuf::RepeatedField<double>& values, const std::string& field) {
   if (values.size() % 3 != 0)
-    throw FieldError(field, "must be x, y, z of each point; " + std::to_string(values.size()) +
-                                " numbers do not divide by 3");
+    throw FieldError(field,
+                     "must be x, y, z of each point; " + std::to_string(values.size()) + " numbers do not divide by 3");
   std::vector<Vec3> points;
   points.reserve(values.size() / 3);
   for (int i = 0; i < values.size(); i += 3) points.emplace_back(values[i], values[i + 1], values[i + 2]);
@@ -66,8 +66,9 @@ Geometry read_kind(const Kinds& kinds, const std::string& field) {
       return HeightField{h.columns(), h.rows(), h.spacing_x(), h.spacing_y(), {h.heights().begin(), h.heights().end()}};
     }
     default:
-      throw FieldError(field, "has no shape that this version of SODA knows (sphere, box, capsule, cylinder, "
-                              "convex_hull, compound, plane, triangle_mesh, height_field)");
+      throw FieldError(field,
+                       "has no shape that this version of SODA knows (sphere, box, capsule, cylinder, "
+                       "convex_hull, compound, plane, triangle_mesh, height_field)");
   }
 }
 

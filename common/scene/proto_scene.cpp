@@ -34,7 +34,9 @@ Drive read_drive(const pb::Drive& message) {
 }
 
 // Whether to write a value at all: all-zero bits are what a missing field reads as (-0.0 is not).
-bool is_zero(const Vec3& v) { return std::all_of(v.begin(), v.end(), [](double c) { return std::bit_cast<std::uint64_t>(c) == 0; }); }
+bool is_zero(const Vec3& v) {
+  return std::all_of(v.begin(), v.end(), [](double c) { return std::bit_cast<std::uint64_t>(c) == 0; });
+}
 
 bool is_identity(const Pose& pose) {
   return is_zero(pose.position) && is_zero(pose.orientation.vec()) && pose.orientation.w() == 1;
@@ -85,8 +87,9 @@ class SceneReader {
     if (message_.has_max_speed()) scene_.max_speed = message_.max_speed();
     scene_.territory_cell = message_.territory_cell();
     if (message_.joint_size() > 0)
-      throw FieldError("joint[0]", "joints are part of the format, but SODA does not simulate them yet; the scene has " +
-                                       std::to_string(message_.joint_size()));
+      throw FieldError("joint[0]",
+                       "joints are part of the format, but SODA does not simulate them yet; the scene has " +
+                           std::to_string(message_.joint_size()));
     if (message_.has_body_count() && message_.body_count() != static_cast<std::uint64_t>(message_.body_size()))
       throw FieldError("body_count", "says " + std::to_string(message_.body_count()) + ", but there are " +
                                          std::to_string(message_.body_size()) + " bodies: is the file cut short?");
@@ -102,7 +105,8 @@ class SceneReader {
       if (material.has_friction() && !(material.friction() >= 0 && material.friction() <= kMaxFriction))
         throw FieldError(field + ".friction", "must be between 0 and 100, is " + std::to_string(material.friction()));
       if (material.has_restitution() && !(material.restitution() >= 0 && material.restitution() <= 1))
-        throw FieldError(field + ".restitution", "must be between 0 and 1, is " + std::to_string(material.restitution()));
+        throw FieldError(field + ".restitution",
+                         "must be between 0 and 1, is " + std::to_string(material.restitution()));
       if (!materials_.emplace(material.name(), &material).second)
         throw FieldError(field + ".name", "is used twice: \"" + material.name() + "\"");
     }
@@ -200,7 +204,8 @@ class SceneReader {
       if (message.compound().shape_size() == 0) throw FieldError(field + ".compound", "must have at least one shape");
       const bool outer = std::exchange(in_compound_, true);
       for (int s = 0; s < message.compound().shape_size(); ++s)
-        read_shape(message.compound().shape(s), shape.pose, field + ".compound." + at("shape", s), density, body, densities);
+        read_shape(message.compound().shape(s), shape.pose, field + ".compound." + at("shape", s), density, body,
+                   densities);
       in_compound_ = outer;
       return;
     }
@@ -210,7 +215,8 @@ class SceneReader {
         throw FieldError(field + ".shared", "names geometry " + std::to_string(shape.geometry) + " of " +
                                                 std::to_string(message_.geometry_size()));
       if (!body.is_static)  // the table was checked for static bodies, which may have more kinds
-        if (auto p = problem_in_kind(scene_.geometries[shape.geometry])) throw FieldError(field + "." + p->field, p->reason);
+        if (auto p = problem_in_kind(scene_.geometries[shape.geometry]))
+          throw FieldError(field + "." + p->field, p->reason);
     } else {
       Geometry geometry = message.has_mesh_file() ? read_mesh_file(message.mesh_file(), field, body.is_static)
                                                   : read_geometry(message, field);
@@ -241,7 +247,8 @@ class SceneReader {
 
   void read_inertial(const pb::Inertial& message, const std::vector<double>& densities, Body& body) {
     refuse_unknown(message, "inertial");
-    if (message.has_inertia() && !message.has_mass()) throw FieldError("inertial.mass", "must be given with an inertia");
+    if (message.has_inertia() && !message.has_mass())
+      throw FieldError("inertial.mass", "must be given with an inertia");
     if (message.has_centre() && !message.has_inertia())
       throw FieldError("inertial.inertia", "must be given with a centre of mass");
     if (body.shapes.empty()) return;  // refused by validate

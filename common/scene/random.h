@@ -1,5 +1,5 @@
-// Random numbers that are the same on every machine and with every compiler: integers by xoshiro256++, doubles from their
-// bits. (The distributions of the standard library differ between its implementations.)
+// Random numbers that are the same on every machine and with every compiler: integers by xoshiro256++, doubles from
+// their bits. (The distributions of the standard library differ between its implementations.)
 #pragma once
 
 #include <array>

@@ -1,11 +1,11 @@
 #include "common/scene/scene_file.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/text_format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -51,8 +51,9 @@ class FirstError : public gp::io::ErrorCollector {
   }
   void AddWarning(int, gp::io::ColumnNumber, const std::string&) override {}
   [[noreturn]] void raise(std::string_view source) const {
-    refuse(source, message.empty() ? "is not a scene in Protobuf text format"
-                                   : message + " (column " + std::to_string(column_) + ")",
+    refuse(source,
+           message.empty() ? "is not a scene in Protobuf text format"
+                           : message + " (column " + std::to_string(column_) + ")",
            line_);
   }
 

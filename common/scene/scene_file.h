@@ -16,8 +16,8 @@ namespace soda {
 // Reads, completes (see from_proto) and validates. Throws SceneError, with the line where a text file is wrong.
 Scene load_scene(const std::filesystem::path& path, const MeshLoader& mesh_loader = {});
 
-// Writes in the format of the extension, to a temporary file that then takes the name: a reader, or a crash, sees the old
-// file or the new one. Throws SceneError.
+// Writes in the format of the extension, to a temporary file that then takes the name: a reader, or a crash, sees the
+// old file or the new one. Throws SceneError.
 void save_scene(const Scene& scene, const std::filesystem::path& path);
 
 // The bytes of a .scene file. The same scene has the same bytes, so that a hash of them names it.

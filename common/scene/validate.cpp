@@ -93,8 +93,7 @@ struct GeometryCheck {
   }
   MaybeProblem operator()(const ConvexHull& h) const {
     const std::string field = "convex_hull.points";
-    if (h.points.size() < 4)
-      return Problem{field, "must be at least 4 points, are " + std::to_string(h.points.size())};
+    if (h.points.size() < 4) return Problem{field, "must be at least 4 points, are " + std::to_string(h.points.size())};
     if (h.points.size() > kMaxHullPoints)
       return Problem{field, "must be at most " + std::to_string(kMaxHullPoints) + " points"};
     if (auto p = points(field, h.points)) return p;
@@ -226,7 +225,8 @@ MaybeProblem body_problem(const Scene& scene, const Body& body) {
   if (body.id == 0 || body.id > kMaxBodyId) return Problem{"id", "must be between 1 and 2^63 - 1"};
   if (auto p = name_problem(body.name)) return p;
   if (auto p = pose_problem("pose", body.pose)) return p;
-  if (auto p = length_in_range("linear_velocity", body.linear_velocity, scene.max_speed, " m/s (the scene's max_speed)"))
+  if (auto p =
+          length_in_range("linear_velocity", body.linear_velocity, scene.max_speed, " m/s (the scene's max_speed)"))
     return p;
   if (auto p = length_in_range("angular_velocity", body.angular_velocity, kMaxSpin, " rad/s")) return p;
   if (body.shapes.empty()) return Problem{"shape", "a body needs at least one shape"};

@@ -20,9 +20,9 @@ struct SceneError : std::runtime_error {
   SceneError(std::string source_, std::string body_, std::string field_, std::string reason_, int line_ = 0,
              std::size_t body_index_ = kNoBody);
 
-  std::string source;      // file name
-  std::string body;        // `body 7 "crate"`; empty for the scene's own fields
-  std::string field;       // as idl/scene.proto (or SDF) spells it; may be empty
+  std::string source;  // file name
+  std::string body;    // `body 7 "crate"`; empty for the scene's own fields
+  std::string field;   // as idl/scene.proto (or SDF) spells it; may be empty
   std::string reason;
   int line = 0;            // in a text file, counted from 1; 0: not known
   std::size_t body_index;  // position among the bodies, for finding the line; kNoBody if none
@@ -34,20 +34,20 @@ struct Problem {
 };
 
 // Limits, all inclusive. Beyond them double precision, Bullet's tolerances or plain sense fail.
-constexpr double kMaxCoordinate = 1e7;               // m: an ulp is 2 nm
-constexpr double kMinSize = 1e-5, kMaxSize = 1e7;    // m, of any edge, radius or spacing
-constexpr double kMinMass = 1e-9, kMaxMass = 1e12;   // kg
-constexpr double kMinGyration = 1e-6;                // m: sqrt(smallest principal inertia / mass)
-constexpr double kMaxGyration = 1e7;                 // m: sqrt(largest principal inertia / mass)
+constexpr double kMaxCoordinate = 1e7;                   // m: an ulp is 2 nm
+constexpr double kMinSize = 1e-5, kMaxSize = 1e7;        // m, of any edge, radius or spacing
+constexpr double kMinMass = 1e-9, kMaxMass = 1e12;       // kg
+constexpr double kMinGyration = 1e-6;                    // m: sqrt(smallest principal inertia / mass)
+constexpr double kMaxGyration = 1e7;                     // m: sqrt(largest principal inertia / mass)
 constexpr double kMinDensity = 1e-3, kMaxDensity = 1e6;  // kg/m^3
-constexpr double kMaxSpeedLimit = 1e5;               // m/s, of Scene::max_speed
-constexpr double kMaxSpin = 1e5;                     // rad/s
-constexpr double kMaxAcceleration = 1e6;             // m/s^2, of gravity and drives
-constexpr double kMinStep = 1e-6, kMaxStep = 1;      // s, of Scene::dt
+constexpr double kMaxSpeedLimit = 1e5;                   // m/s, of Scene::max_speed
+constexpr double kMaxSpin = 1e5;                         // rad/s
+constexpr double kMaxAcceleration = 1e6;                 // m/s^2, of gravity and drives
+constexpr double kMinStep = 1e-6, kMaxStep = 1;          // s, of Scene::dt
 constexpr unsigned kMaxSubsteps = 64;
 constexpr double kMaxFriction = 100;
-constexpr double kMaxDamping = 1e4;                  // 1/s
-constexpr std::size_t kMaxNameLength = 1000;         // bytes
+constexpr double kMaxDamping = 1e4;           // 1/s
+constexpr std::size_t kMaxNameLength = 1000;  // bytes
 constexpr std::size_t kMaxHullPoints = 100'000;
 
 // Throws SceneError for the first thing wrong. `source` is the name that the error shows.

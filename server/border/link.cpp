@@ -64,10 +64,10 @@ void Link::receive(Message message, const std::function<void(Message&)>& deliver
   while (!early_.empty() && early_.begin()->first == received_ + 1) {
     Message next = std::move(early_.begin()->second);
     early_.erase(early_.begin());
+    deliver(next);  // a message that is refused does not count, and will be asked for again
     ++received_;
     upto_ = next.header.upto;
     final_ = std::max(final_, next.header.final_step);
-    deliver(next);
   }
   if (!early_.empty() && asked_after_ != received_) ask_ = true;
 }

@@ -39,7 +39,7 @@ double nearest_point(const ContactRecord& record, const Party& a, const Party& b
 
 bool keeps_anchors(ShapeKind kind) {
   // A round body rolls away from its anchors; only faces keep theirs.
-  return kind == ShapeKind::kBox || kind == ShapeKind::kHull || kind == ShapeKind::kConcave;
+  return kind != ShapeKind::kSphere && kind != ShapeKind::kCapsule && kind != ShapeKind::kCylinder;
 }
 
 Placement place(const Party& body, const Child& child) {

@@ -12,13 +12,6 @@ namespace {
 constexpr std::size_t kTableFactor = 8;
 constexpr std::uint32_t kNone = 0xffffffffu;
 
-// Half edge of the box that stands for a plane: beyond everything that is in the scene at the start.
-double plane_extent_of(const Scene& scene) {
-  double extent = 1000;
-  for (const Body& body : scene.bodies) extent = std::max(extent, 2 * body.pose.position.cwiseAbs().maxCoeff());
-  return extent;
-}
-
 bool is_isotropic(const Mat3& inertia) {
   const double scale = inertia(0, 0);
   return (inertia - scale * Mat3::Identity()).cwiseAbs().maxCoeff() <= 1e-12 * std::abs(scale);
@@ -34,11 +27,10 @@ const T* find_by_id(const std::vector<T>& sorted, BodyId id) {
 
 Model::Model(Scene scene) : scene_(std::move(scene)) {
   std::sort(scene_.bodies.begin(), scene_.bodies.end(), [](const Body& l, const Body& r) { return l.id < r.id; });
-  const double plane_extent = plane_extent_of(scene_);
   std::vector<double> radii;
   for (const Body& body : scene_.bodies) {
     const auto children = static_cast<std::uint32_t>(body.shapes.size());
-    const std::uint32_t first = shapes_.add(scene_, body, plane_extent);
+    const std::uint32_t first = shapes_.add(scene_, body);
     if (body.is_static) {
       StaticModel s;
       s.id = body.id;

@@ -1,51 +1,31 @@
 #include "server/physics/shape_store.h"
 
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
-#include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
-#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
-#include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 
 #include <algorithm>
 #include <limits>
+#include <unordered_map>
+
+#include "server/physics/triangle_surface.h"
 
 namespace soda::physics {
 namespace {
 
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
 btVector3 to_bullet(const Vec3& v) { return btVector3(v.x(), v.y(), v.z()); }
-Vec3 from_bullet(const btVector3& v) { return Vec3(v.x(), v.y(), v.z()); }
-
-// What a mesh shape refers to but does not own.
-struct MeshData {
-  std::vector<int> indices;
-  std::vector<double> vertices;
-  std::unique_ptr<btTriangleIndexVertexArray> array;
-};
-
-ShapeKind kind_of(const Geometry& g) {
-  struct Visitor {
-    ShapeKind operator()(const Sphere&) const { return ShapeKind::kSphere; }
-    ShapeKind operator()(const Box&) const { return ShapeKind::kBox; }
-    ShapeKind operator()(const Plane&) const { return ShapeKind::kBox; }
-    ShapeKind operator()(const ConvexHull&) const { return ShapeKind::kHull; }
-    ShapeKind operator()(const Capsule&) const { return ShapeKind::kRound; }
-    ShapeKind operator()(const Cylinder&) const { return ShapeKind::kRound; }
-    ShapeKind operator()(const TriangleMesh&) const { return ShapeKind::kConcave; }
-    ShapeKind operator()(const HeightField&) const { return ShapeKind::kConcave; }
-  };
-  return std::visit(Visitor{}, g);
-}
 
 }  // namespace
 
+// Bodies share what is made from one geometry.
 struct ShapeStore::Owned {
-  std::vector<const btCollisionShape*> by_geometry;  // index as in Scene::geometries, null until first used
-  std::vector<std::unique_ptr<btCollisionShape>> shapes;
-  std::vector<std::unique_ptr<MeshData>> meshes;
-  std::vector<std::unique_ptr<std::vector<double>>> heights;
+  std::unordered_map<std::uint32_t, Child> prepared;  // by index of the geometry; with neither pose
+  std::vector<std::unique_ptr<btConvexShape>> shapes;
+  std::vector<std::unique_ptr<TriangleSurface>> surfaces;
 
   template <typename T, typename... Args>
   T* make(Args&&... args) {
@@ -60,98 +40,97 @@ ShapeStore::ShapeStore() : owned_(std::make_unique<Owned>()) {}
 ShapeStore::~ShapeStore() = default;
 
 // Margins are 0 wherever Bullet allows: the shapes are exactly what the scene says, not rounded and not blown up.
-const btCollisionShape* ShapeStore::geometry_shape(const Scene& scene, std::uint32_t index, double plane_extent) {
-  Owned& own = *owned_;
-  own.by_geometry.resize(scene.geometries.size(), nullptr);
-  if (own.by_geometry[index]) return own.by_geometry[index];
+void ShapeStore::prepare(const Geometry& geometry, Child& child) {
   struct Visitor {
     Owned& own;
-    double plane_extent;
-    const btCollisionShape* polyhedral(btPolyhedralConvexShape* s) const {
+    Child& child;
+    void box(const Vec3& half) const { child.box_half = half; }
+    void points(const std::vector<Vec3>& all) const {
+      Vec3 low = all.front(), high = low;
+      for (const Vec3& p : all) low = low.cwiseMin(p), high = high.cwiseMax(p);
+      child.box_centre = 0.5 * (low + high);
+      child.box_half = 0.5 * (high - low);
+    }
+    void surface(std::unique_ptr<TriangleSurface> made) const {
+      child.kind = ShapeKind::kConcave;
+      child.box_centre = 0.5 * (made->bounds().min + made->bounds().max);
+      child.box_half = 0.5 * (made->bounds().max - made->bounds().min);
+      child.surface = made.get();
+      own.surfaces.push_back(std::move(made));
+    }
+    void operator()(const Sphere& s) const {
+      child.kind = ShapeKind::kSphere;
+      child.radius = s.radius;
+      child.shape = own.make<btSphereShape>(s.radius);
+      box(Vec3::Constant(s.radius));
+    }
+    void operator()(const Box& b) const {
+      child.kind = ShapeKind::kBox;
+      auto* s = own.make<btBoxShape>(to_bullet(0.5 * b.size));
       s->setMargin(0);
-      s->initializePolyhedralFeatures();
-      return s;
+      child.shape = s;
+      box(0.5 * b.size);
     }
-    const btCollisionShape* operator()(const Sphere& s) const { return own.make<btSphereShape>(s.radius); }
-    const btCollisionShape* operator()(const Box& b) const {
-      return polyhedral(own.make<btBoxShape>(to_bullet(0.5 * b.size)));
+    void operator()(const Plane&) const {
+      child.kind = ShapeKind::kPlane;
+      box(Vec3::Constant(kFar));
     }
-    const btCollisionShape* operator()(const Plane&) const {
-      return polyhedral(own.make<btBoxShape>(btVector3(plane_extent, plane_extent, plane_extent)));
+    void operator()(const Capsule& c) const {
+      child.kind = ShapeKind::kCapsule;
+      child.radius = c.radius;
+      child.half_length = 0.5 * c.length;
+      child.shape = own.make<btCapsuleShapeZ>(c.radius, c.length);
+      box(Vec3(c.radius, c.radius, 0.5 * c.length + c.radius));
     }
-    const btCollisionShape* operator()(const Capsule& c) const {
-      return own.make<btCapsuleShapeZ>(c.radius, c.length);
-    }
-    const btCollisionShape* operator()(const Cylinder& c) const {
+    void operator()(const Cylinder& c) const {
+      child.kind = ShapeKind::kCylinder;
+      child.radius = c.radius;
+      child.half_length = 0.5 * c.length;
       auto* s = own.make<btCylinderShapeZ>(btVector3(c.radius, c.radius, 0.5 * c.length));
       s->setMargin(0);
-      return s;
+      child.shape = s;
+      box(Vec3(c.radius, c.radius, 0.5 * c.length));
     }
-    const btCollisionShape* operator()(const ConvexHull& h) const {
+    void operator()(const ConvexHull& h) const {
+      child.kind = ShapeKind::kHull;
       auto* s = own.make<btConvexHullShape>();
       for (const Vec3& p : h.points) s->addPoint(to_bullet(p), false);
+      s->setMargin(0);
       s->recalcLocalAabb();
-      return polyhedral(s);
+      s->initializePolyhedralFeatures();
+      child.shape = s;
+      points(h.points);
     }
-    const btCollisionShape* operator()(const TriangleMesh& m) const {
-      auto data = std::make_unique<MeshData>();
-      for (const auto& t : m.triangles)
-        for (std::uint32_t i : t) data->indices.push_back(static_cast<int>(i));
-      for (const Vec3& v : m.vertices) data->vertices.insert(data->vertices.end(), {v.x(), v.y(), v.z()});
-      data->array = std::make_unique<btTriangleIndexVertexArray>(
-          static_cast<int>(m.triangles.size()), data->indices.data(), static_cast<int>(3 * sizeof(int)),
-          static_cast<int>(m.vertices.size()), data->vertices.data(), static_cast<int>(3 * sizeof(double)));
-      auto* s = own.make<btBvhTriangleMeshShape>(data->array.get(), true);
-      own.meshes.push_back(std::move(data));
-      return s;
-    }
-    const btCollisionShape* operator()(const HeightField& f) const {
-      own.heights.push_back(std::make_unique<std::vector<double>>(f.heights));
-      const auto [low, high] = std::minmax_element(f.heights.begin(), f.heights.end());
-      auto* s = own.make<btHeightfieldTerrainShape>(static_cast<int>(f.columns), static_cast<int>(f.rows),
-                                                    own.heights.back()->data(), *low, *high, 2, false);
-      s->setLocalScaling(btVector3(f.spacing_x, f.spacing_y, 1));
-      return s;
-    }
+    void operator()(const TriangleMesh& m) const { surface(std::make_unique<TriangleSurface>(m)); }
+    void operator()(const HeightField& f) const { surface(std::make_unique<TriangleSurface>(f)); }
   };
-  return own.by_geometry[index] = std::visit(Visitor{own, plane_extent}, scene.geometries[index]);
+  std::visit(Visitor{*owned_, child}, geometry);
+  // A sheet's own thickness says nothing: what rests on it sets the scale.
+  child.inner_extent = child.surface ? kFar : child.box_half.minCoeff();
 }
 
-std::uint32_t ShapeStore::add(const Scene& scene, const Body& body, double plane_extent) {
+std::uint32_t ShapeStore::add(const Scene& scene, const Body& body) {
   const auto first = static_cast<std::uint32_t>(children_.size());
   for (const Shape& shape : body.shapes) {
     const Geometry& geometry = scene.geometries[shape.geometry];
-    Child child;
-    child.kind = kind_of(geometry);
+    const auto [prepared, is_new] = owned_->prepared.try_emplace(shape.geometry);
+    if (is_new) prepare(geometry, prepared->second);
+    Child child = prepared->second;
     child.pose = shape.pose;
-    if (const auto* plane = std::get_if<Plane>(&geometry)) {
+    if (const auto* plane = std::get_if<Plane>(&geometry))
       child.pose.orientation = shape.pose.orientation * Quat::FromTwoVectors(Vec3::UnitZ(), plane->normal);
-      child.pose.position = shape.pose.position - child.pose.orientation * Vec3(0, 0, plane_extent);
-    }
-    if (const auto* field = std::get_if<HeightField>(&geometry)) {
-      // Bullet centres the field's box on its origin.
-      const auto [low, high] = std::minmax_element(field->heights.begin(), field->heights.end());
-      child.pose.position = shape.pose.position + shape.pose.orientation * Vec3(0, 0, 0.5 * (*low + *high));
-    }
-    if (const auto* sphere = std::get_if<Sphere>(&geometry)) child.radius = sphere->radius;
     child.pose.position -= body.inertial.centre;
     child.rotation = child.pose.orientation.toRotationMatrix();
     child.centred = child.pose.position.isZero(0) && child.rotation == Mat3::Identity();
-    child.shape = geometry_shape(scene, shape.geometry, plane_extent);
-    btVector3 low, high;
-    child.shape->getAabb(btTransform::getIdentity(), low, high);
-    child.box_centre = 0.5 * from_bullet(low + high);
-    child.box_half = 0.5 * from_bullet(high - low);
-    child.inner_extent = child.box_half.minCoeff();
     children_.push_back(child);
   }
   return first;
 }
 
 Aabb bounding_box(std::span<const Child> children, const Vec3& position, const Mat3& rotation) {
-  constexpr double kFar = std::numeric_limits<double>::infinity();
   Aabb box{Vec3::Constant(kFar), Vec3::Constant(-kFar)};
   for (const Child& child : children) {
+    if (child.kind == ShapeKind::kPlane) return {Vec3::Constant(-kFar), Vec3::Constant(kFar)};
     if (child.kind == ShapeKind::kSphere) {
       const Vec3 centre = child.centred ? position : position + rotation * child.pose.position;
       const Vec3 half = Vec3::Constant(child.radius);

@@ -1,5 +1,4 @@
-// The collision shapes of a scene: every body's children, flattened, with their Bullet shapes. Immutable after
-// construction.
+// The collision shapes of a scene: every body's children, flattened. Immutable after construction.
 #pragma once
 
 #include <cstdint>
@@ -9,29 +8,34 @@
 
 #include "common/scene/scene.h"
 
-class btCollisionShape;
+class btConvexShape;
 
 namespace soda::physics {
+
+class TriangleSurface;
 
 enum class ShapeKind : std::uint8_t {
   kSphere,
   kBox,
-  kHull,      // polyhedral, with faces for clipping
-  kRound,     // capsule, cylinder: convex, neither a sphere nor polyhedral
+  kHull,
+  kCapsule,   // along its z axis, as is
+  kCylinder,
+  kPlane,     // static only: solid below z = 0 of its own frame
   kConcave,   // triangle mesh or height field; static only
 };
 
-// One convex (or static concave) shape of a body. A body with several is a compound; each pair of children has contact
-// records of its own.
+// One shape of a body. A body with several is a compound; each pair of children has contact records of its own.
 struct Child {
   ShapeKind kind = ShapeKind::kSphere;
   bool centred = false;              // pose is the identity
   Pose pose;                         // in the body's frame (origin at the centre of mass)
   Mat3 rotation = Mat3::Identity();  // of pose
   Vec3 box_centre = Vec3::Zero(), box_half = Vec3::Zero();  // m, bounding box in the child's own frame
-  double radius = 0;                 // m; of a sphere
+  double radius = 0;                 // m; of a sphere, capsule, cylinder
+  double half_length = 0;            // m; of a capsule's or cylinder's cylindrical part
   double inner_extent = 0;           // m, smallest half extent
-  const btCollisionShape* shape = nullptr;
+  const btConvexShape* shape = nullptr;          // for GJK; null where not convex
+  const TriangleSurface* surface = nullptr;      // where concave
 };
 
 class ShapeStore {
@@ -41,9 +45,8 @@ class ShapeStore {
   ShapeStore(const ShapeStore&) = delete;
   ShapeStore& operator=(const ShapeStore&) = delete;
 
-  // Adds a body's shapes as children, with poses relative to its centre of mass; returns the index of the first. A plane
-  // becomes a box of half edge `plane_extent`, whose upper face is the plane, so that boxes rest on it with four points.
-  std::uint32_t add(const Scene& scene, const Body& body, double plane_extent);
+  // Adds a body's shapes as children, with poses relative to its centre of mass; returns the index of the first.
+  std::uint32_t add(const Scene& scene, const Body& body);
   std::span<const Child> children() const { return children_; }
   std::span<const Child> children(std::uint32_t first, std::uint32_t count) const {
     return std::span(children_).subspan(first, count);
@@ -51,13 +54,13 @@ class ShapeStore {
 
  private:
   struct Owned;
-  const btCollisionShape* geometry_shape(const Scene& scene, std::uint32_t index, double plane_extent);
+  void prepare(const Geometry& geometry, Child& child);
   std::vector<Child> children_;
   std::unique_ptr<Owned> owned_;
 };
 
 // The bounding box of children at a pose (rotation given as a matrix); exact for boxes and spheres, else that of each
-// child's own bounding box, turned.
+// child's own bounding box, turned. A plane's is infinite.
 Aabb bounding_box(std::span<const Child> children, const Vec3& position, const Mat3& rotation);
 
 }  // namespace soda::physics

@@ -47,6 +47,7 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   border::CoreSettings core;
   core.me = settings.me;
   core.epoch = settings.epoch;
+  core.session = settings.instance;
   core.last_step = settings.last_step;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
@@ -127,8 +128,8 @@ wire::Status Daemon::status() const {
   static const std::string host = host_name();
   s.host(host);
   s.pid(static_cast<std::uint32_t>(getpid()));
-  s.clock(core_->clock());
-  s.final_step(core_->final_step());
+  s.clock(std::max<Step>(0, core_->clock()));  // below 0 before state 0 is known
+  s.final_step(std::max<Step>(0, core_->final_step()));
   s.bodies(core_->own_bodies());
   s.cells(core_->own_cells());
   s.neighbours(static_cast<std::uint32_t>(core_->neighbours().size()));

@@ -35,6 +35,7 @@ SessionService::~SessionService() {
   {
     const std::lock_guard lock(mutex_);
     quit_ = true;
+    news_ = true;
   }
   changed_.notify_one();
   thread_.join();
@@ -76,6 +77,7 @@ void SessionService::status(const wire::Status& status) {
     seat.silent = false;
     seat.state = std::max(seat.state, status.state());
     seat.final_step = std::max<Step>(seat.final_step, status.final_step());
+    news_ = true;
   }
   changed_.notify_one();
 }
@@ -130,6 +132,7 @@ void SessionService::run() {
   last.displayed(-1);
   std::unique_lock lock(mutex_);
   while (!quit_) {
+    news_ = false;
     const wire::Control control = next(seconds_now());
     if (control.phase() != last.phase() || control.displayed() != last.displayed() || control.limit() != last.limit()) {
       last = control;
@@ -140,7 +143,7 @@ void SessionService::run() {
       if (quit_) break;
     }
     const bool ticking = phase_ == wire::PHASE_RUNNING && session_.pace() > 0;
-    changed_.wait_for(lock, ticking ? kTick : std::chrono::milliseconds(500));
+    changed_.wait_for(lock, ticking ? kTick : std::chrono::milliseconds(500), [this] { return news_; });
   }
 }
 

@@ -54,6 +54,7 @@ class SessionService {
   Pacer pacer_;
   std::uint8_t phase_ = wire::PHASE_GATHERING;
   double next_log_ = 0;
+  bool news_ = false;  // since run() looked
   bool quit_ = false;
   std::thread thread_;
 };

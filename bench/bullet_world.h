@@ -1,0 +1,25 @@
+// A scene in stock Bullet, as its users would run it: btDiscreteDynamicsWorld in double precision with its default broad
+// phase, solver, iterations and settings; sleeping off. For comparison only.
+#pragma once
+
+#include <memory>
+
+#include "common/scene/scene.h"
+
+namespace soda::bench {
+
+class BulletWorld {
+ public:
+  // Throws std::invalid_argument for triangle meshes and height fields. The scene must outlive the world.
+  explicit BulletWorld(const Scene& scene);
+  ~BulletWorld();
+
+  void step();  // by the scene's dt
+  Vec3 position(std::size_t body) const;  // m, centre of mass; by position among the scene's dynamic bodies
+
+ private:
+  struct World;
+  std::unique_ptr<World> world_;
+};
+
+}  // namespace soda::bench

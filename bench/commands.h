@@ -1,0 +1,11 @@
+// The commands of soda-bench, one file each.
+#pragma once
+
+#include "bench/harness.h"
+
+namespace soda::bench {
+
+void step(const Options& options, Headline& headline);    // our step against stock Bullet
+void worlds(const Options& options, Headline& headline);  // one world against two
+
+}  // namespace soda::bench

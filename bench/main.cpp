@@ -1,0 +1,46 @@
+// soda-bench: what SODA costs and what it gains, measured.
+#include <CLI/CLI.hpp>
+
+#include <iostream>
+
+#include "bench/commands.h"
+#include "common/version.h"
+
+namespace {
+
+struct Command {
+  const char *name, *summary;
+  void (*run)(const soda::bench::Options&, soda::bench::Headline&);
+};
+
+constexpr Command kCommands[] = {
+    {"step", "time and standing towers of our step against stock Bullet, side by side", soda::bench::step},
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Benchmarks of SODA"};
+  app.require_subcommand(1);
+  soda::bench::Options options;
+  for (const Command& command : kCommands) {
+    CLI::App* sub = app.add_subcommand(command.name, command.summary);
+    sub->add_option("--out", options.out, "directory for CSV files and pictures");
+    sub->add_option("--json", options.json, "file for the headline numbers");
+    sub->add_option("--rounds", options.rounds, "repetitions of which the median is taken")->check(CLI::Range(1, 100));
+    sub->add_flag("--quick", options.quick, "small and short: to see that it works, not to measure");
+  }
+  CLI11_PARSE(app, argc, argv);
+  try {
+    if (!options.out.empty()) std::filesystem::create_directories(options.out);
+    soda::bench::Headline headline;
+    for (const Command& command : kCommands)
+      if (app.got_subcommand(command.name)) command.run(options, headline);
+    headline.print();
+    if (!options.json.empty()) headline.write(options.json);
+  } catch (const std::exception& error) {
+    std::cerr << "soda-bench: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

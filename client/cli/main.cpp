@@ -1,0 +1,31 @@
+// soda: the command.
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "client/cli/diff_command.h"
+#include "client/cli/run_command.h"
+#include "client/cli/scene_command.h"
+#include "client/cli/watch_command.h"
+#include "common/version.h"
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("soda"));
+  spdlog::set_pattern("%^%l%$: %v");
+  CLI::App app("SODA: distributed rigid-body simulation with the same bits on any number of processes", "soda");
+  app.set_version_flag("--version", std::string("soda ") + soda::kVersion);
+  app.require_subcommand(1);
+  int exit_code = 0;
+  soda::cli::add_run_command(app, exit_code);
+  soda::cli::add_watch_command(app, exit_code);
+  soda::cli::add_diff_command(app, exit_code);
+  soda::add_scene_command(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  return exit_code;
+}

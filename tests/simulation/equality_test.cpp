@@ -1,0 +1,149 @@
+// The one invariant, at the layer of the protocol: the same bits on 1 world or on many, whatever the network does.
+// A failure names the seed; the same seed repeats the run exactly (--gtest_filter=... with its name).
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <tuple>
+
+#include "common/scene/scene_builder.h"
+#include "tests/simulation/scenes.h"
+#include "tests/simulation/simulated_session.h"
+
+namespace soda::test {
+namespace {
+
+struct Reference {
+  Scene scene;
+  std::vector<StepDigest> steps;
+};
+
+const Reference& reference(const std::string& name) {
+  static std::map<std::string, Reference> cache;
+  const auto it = cache.find(name);
+  if (it != cache.end()) return it->second;
+  const HardScene& hard = hard_scene(name);
+  Reference made{hard.make(), {}};
+  made.steps = run_single(made.scene, hard.steps);
+  return cache.emplace(name, std::move(made)).first->second;
+}
+
+// Boxes at rest across many cells, each alone.
+Scene still_row() {
+  SceneBuilder builder("still row");
+  builder.add_ground(100);
+  for (int i = 0; i < 20; ++i) builder.add(Box{Vec3(0.8, 0.8, 0.8)}, Vec3(-10 + i, 0, 0.4));
+  return builder.finish();
+}
+
+std::vector<std::string> scene_names() {
+  std::vector<std::string> names;
+  for (const HardScene& scene : hard_scenes()) names.emplace_back(scene.name);
+  return names;
+}
+
+NetworkSettings network_of(std::uint64_t seed) {
+  std::mt19937_64 random(seed * 7919);
+  NetworkSettings n;
+  n.seed = seed;
+  n.delay = std::vector<int>{1, 3, 15, 60}[random() % 4];
+  n.slow_share = std::vector<double>{0, 0.05, 0.4}[random() % 3];
+  n.double_share = std::vector<double>{0, 0.1}[random() % 2];
+  n.loss_share = std::vector<double>{0, 0, 0.03}[random() % 3];
+  n.stall_share = std::vector<double>{0, 0.5, 0.9}[random() % 3];
+  return n;
+}
+
+void expect_equal(const Reference& expected, const SessionResult& got, Step steps) {
+  ASSERT_EQ(got.failure, "");
+  ASSERT_EQ(got.steps.size(), static_cast<std::size_t>(steps) + 1);
+  EXPECT_EQ(first_difference(expected.steps, got.steps), "");
+  EXPECT_EQ(got.total.refused, 0u);
+}
+
+using Param = std::tuple<std::string, WorldId, int>;  // scene, worlds, seed
+class Equality : public testing::TestWithParam<Param> {};
+
+TEST_P(Equality, SameBitsAsOneWorld) {
+  const auto& [name, worlds, seed] = GetParam();
+  const Reference& expected = reference(name);
+  const HardScene& hard = hard_scene(name);
+  const NetworkSettings network = network_of(static_cast<std::uint64_t>(seed));
+  const SessionResult got = run_session(expected.scene, worlds, hard.steps, network);
+  expect_equal(expected, got, hard.steps);
+  // What makes it interesting must have happened.
+  EXPECT_GT(got.total.frame_bodies_sent, 0u);
+  EXPECT_TRUE(!hard.mixes || got.total.mixed_islands > 0);
+  EXPECT_TRUE(network.double_share == 0 || got.total.duplicates > 0);
+  EXPECT_TRUE(got.lost == 0 || got.total.messages_resent > 0);
+}
+
+std::string param_name(const testing::TestParamInfo<Param>& info) {
+  return std::get<0>(info.param) + "_" + std::to_string(std::get<1>(info.param)) + "worlds_seed" +
+         std::to_string(std::get<2>(info.param));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sample, Equality,
+                         testing::Combine(testing::ValuesIn(scene_names()), testing::Values(2u, 3u, 5u, 8u),
+                                          testing::Values(1, 2)),
+                         param_name);
+INSTANTIATE_TEST_SUITE_P(All, Equality,
+                         testing::Combine(testing::ValuesIn(scene_names()), testing::Range(2u, 10u),
+                                          testing::Range(100, 112)),
+                         param_name);
+
+// Territories in any shape, not even connected: every body is near somebody else's.
+class AnyTerritories : public testing::TestWithParam<std::tuple<std::string, int>> {};
+
+TEST_P(AnyTerritories, SameBitsAsOneWorld) {
+  const auto& [name, seed] = GetParam();
+  const Reference& expected = reference(name);
+  const HardScene& hard = hard_scene(name);
+  std::mt19937_64 random(static_cast<std::uint64_t>(seed));
+  const WorldId worlds = 2 + static_cast<WorldId>(random() % 5);
+  std::vector<WorldId> owner(make_grid(expected.scene).cells());
+  for (WorldId& w : owner) w = static_cast<WorldId>(random() % worlds);
+  for (WorldId w = 0; w < worlds; ++w) owner[w] = w;  // everybody has something
+  const SessionResult got =
+      run_session(expected.scene, worlds, hard.steps, network_of(static_cast<std::uint64_t>(seed)), owner);
+  expect_equal(expected, got, hard.steps);
+  EXPECT_GT(got.total.mixed_islands, 0u);
+  EXPECT_GT(got.total.arrived, 0u);
+}
+
+std::string any_name(const testing::TestParamInfo<std::tuple<std::string, int>>& info) {
+  return std::get<0>(info.param) + "_seed" + std::to_string(std::get<1>(info.param));
+}
+
+const auto kAnyScenes = testing::Values("cubes", "city", "cluster", "wide_bodies", "fast_bodies", "corner");
+INSTANTIATE_TEST_SUITE_P(Sample, AnyTerritories, testing::Combine(kAnyScenes, testing::Range(1, 4)), any_name);
+INSTANTIATE_TEST_SUITE_P(All, AnyTerritories, testing::Combine(kAnyScenes, testing::Range(100, 130)), any_name);
+
+TEST(WideBodies, AreToldToEveryWorldTheyReach) {
+  const Reference& expected = reference("wide_bodies");
+  const SessionResult got = run_session(expected.scene, 8, 150, {});
+  expect_equal(expected, got, 150);
+  EXPECT_GT(got.total.wide_bodies, 0u);
+  EXPECT_GT(got.total.parts_sent, got.total.syncs);  // parts of others were passed on
+}
+
+TEST(Sleep, NothingIsSentForWhatSleeps) {
+  const Scene scene = still_row();
+  const SessionResult slept = run_session(scene, 4, 400, {});
+  ASSERT_EQ(slept.failure, "");
+  const SessionResult half = run_session(scene, 4, 200, {});
+  ASSERT_EQ(half.failure, "");
+  EXPECT_GT(half.total.frames_sent, 0u);
+  EXPECT_EQ(slept.total.frames_sent, half.total.frames_sent) << "frames were sent for sleeping bodies";
+}
+
+TEST(MoreWorldsThanBodies, AreIdleButAgree) {
+  const Reference& expected = reference("corner");
+  const SessionResult got = run_session(expected.scene, 48, 60, {});
+  ASSERT_EQ(got.failure, "");
+  ASSERT_EQ(got.steps.size(), 61u);
+  for (std::size_t t = 0; t <= 60; ++t) ASSERT_EQ(got.steps[t], expected.steps[t]) << "step " << t;
+}
+
+}  // namespace
+}  // namespace soda::test

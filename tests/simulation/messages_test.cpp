@@ -1,0 +1,192 @@
+// The door of the protocol: whatever arrives, the world lives, nothing changes, and the reason is told.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "server/border/codec.h"
+#include "server/border/link.h"
+#include "server/border/near_sets.h"
+#include "server/physics/stepper.h"
+#include "tests/simulation/scenes.h"
+#include "tests/simulation/simulated_session.h"
+
+namespace soda::test {
+namespace {
+
+using border::CodecError;
+using border::Message;
+
+// A message with everything in it, from a real step.
+class Messages : public testing::Test {
+ protected:
+  Messages() : model_(hard_scene("heap").make()) {
+    BodySet set = model_.initial_state();
+    physics::Stepper stepper(model_);
+    for (int t = 0; t < 120; ++t) stepper.step(set);
+    EXPECT_GT(set.contacts.size(), 50u);
+    message_.header = {.session = 7, .from = 1, .to = 0, .epoch = 1, .to_epoch = 1, .sequence = 3, .ack = 2, .need = true,
+                       .upto = 120, .final_step = 119, .durable = 0};
+    message_.frames.push_back({120, {1, 0}, set});
+    border::Component component{set, {{set.bodies[3].id, 2, 99}, {set.bodies[5].id, 0, 98}}};
+    message_.parts.push_back({.origin = 1, .step = 120, .through = 120, .revision = {1, 0}, .final = true,
+                              .components = {component, {}}});
+  }
+
+  physics::Model model_;
+  Message message_;
+};
+
+TEST_F(Messages, ComeBackBitForBit) {
+  const auto bytes = border::encode(message_);
+  const Message back = border::decode(bytes, model_);
+  EXPECT_EQ(border::encode(back), bytes);
+  EXPECT_EQ(back.header.final_step, 119);
+  EXPECT_TRUE(back.header.need);
+  ASSERT_EQ(back.frames.size(), 1u);
+  EXPECT_TRUE(border::same(back.frames[0].set, message_.frames[0].set));
+  ASSERT_EQ(back.parts[0].components.size(), 2u);
+  EXPECT_EQ(back.parts[0].components[0].ports[1].record, 98u);
+}
+
+TEST_F(Messages, CutShortAnywhereAreRefused) {
+  const auto bytes = border::encode(message_);
+  for (std::size_t n = 0; n < bytes.size(); n += n < 400 ? 1 : 97)
+    EXPECT_THROW(border::decode(std::span(bytes).first(n), model_), CodecError) << n << " bytes";
+  auto longer = bytes;
+  longer.push_back(std::byte{0});
+  EXPECT_THROW(border::decode(longer, model_), CodecError);
+}
+
+TEST_F(Messages, WithFlippedBitsNeverCrash) {
+  const auto bytes = border::encode(message_);
+  std::mt19937_64 random(5);
+  int refused = 0;
+  for (int i = 0; i < 3000; ++i) {
+    auto broken = bytes;
+    // Early bytes hold counts and sizes: half of the flips go there.
+    const std::size_t range = i % 2 ? broken.size() : 200;
+    broken[random() % range] ^= std::byte{static_cast<unsigned char>(1u << random() % 8)};
+    try {
+      border::decode(broken, model_);
+    } catch (const CodecError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 200);
+}
+
+TEST_F(Messages, WithBadBodiesAreRefusedByName) {
+  const auto refusal = [&](auto&& spoil) {
+    Message bad = message_;
+    spoil(bad.frames[0].set);
+    try {
+      border::decode(border::encode(bad), model_);
+    } catch (const CodecError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  const std::string third = std::to_string(message_.frames[0].set.bodies[2].id);
+  EXPECT_EQ(refusal([](BodySet& s) { s.bodies[2].position[1] = std::numeric_limits<double>::quiet_NaN(); }),
+            "body " + third + ": not finite");
+  EXPECT_EQ(refusal([](BodySet& s) { s.bodies[2].linear_velocity[0] = std::numeric_limits<double>::infinity(); }),
+            "body " + third + ": not finite");
+  EXPECT_EQ(refusal([](BodySet& s) { s.bodies[2].orientation[3] += 1; }),
+            "body " + third + ": orientation is not a unit quaternion");
+  EXPECT_EQ(refusal([](BodySet& s) { s.bodies[2].flags = 1u << 20; }), "body " + third + ": unknown flags");
+  EXPECT_EQ(refusal([](BodySet& s) { s.bodies[2].id = 999999; }), "body 999999: not in the scene");
+  EXPECT_EQ(refusal([](BodySet& s) { std::swap(s.bodies[2], s.bodies[3]); }), "body " + third + ": out of order");
+  EXPECT_NE(refusal([](BodySet& s) { s.contacts[0].normal[0] = std::numeric_limits<double>::quiet_NaN(); }), "accepted");
+  EXPECT_NE(refusal([](BodySet& s) { s.contacts[0].b = kStaticBit | 424242; }), "accepted");
+}
+
+TEST_F(Messages, OfOthersChangeNothing) {
+  const Scene& scene = model_.scene();
+  const TerritoryMap map = bisect(scene, make_grid(scene), 2);
+  border::Observer nobody;
+  border::WorldCore world(model_, map, {.me = 0, .epoch = 1, .session = 7, .last_step = 10}, nobody);
+  const auto refusal = [&](Message m) {
+    EXPECT_FALSE(world.receive(border::encode(m)));
+    return world.last_refusal();
+  };
+  Message hello;
+  hello.header = message_.header;
+  hello.header.upto = hello.header.final_step = 0;
+  Message bad = hello;
+  bad.header.session = 8;
+  EXPECT_NE(refusal(bad).find("another session"), std::string::npos);
+  bad = hello;
+  bad.header.to = 1;
+  EXPECT_NE(refusal(bad).find("for world 1"), std::string::npos);
+  bad = hello;
+  bad.header.from = 5;
+  EXPECT_NE(refusal(bad).find("no neighbour"), std::string::npos);
+  bad = hello;
+  bad.header.sequence = 1;
+  bad.header.upto = 500;
+  EXPECT_NE(refusal(bad).find("cannot be"), std::string::npos);
+  bad = hello;
+  bad.parts = {{.origin = 9, .step = 0, .through = 0, .revision = {}, .final = true, .components = {}}};
+  EXPECT_NE(refusal(bad).find("origin 9"), std::string::npos);
+  EXPECT_EQ(world.stats().refused, 5u);
+  EXPECT_EQ(world.clock(), 0);
+}
+
+TEST(Link, DeliversInOrderAndRepeatsWhatWasLost) {
+  border::Link out(1, 0, 1, 1), in(1, 1, 1, 0);
+  const physics::Model model(hard_scene("corner").make());
+  std::vector<std::vector<std::byte>> sent;
+  for (Step t = 0; t < 5; ++t) out.send(t, t - 1, sent);
+  std::vector<Step> got;
+  const auto deliver = [&](Message& m) { got.push_back(m.header.upto); };
+  const auto give = [&](border::Link& to, const std::vector<std::byte>& bytes) {
+    to.receive(border::decode(bytes, model), deliver);
+  };
+  give(in, sent[1]);  // 0 is late, 2 is lost
+  give(in, sent[1]);
+  give(in, sent[0]);
+  give(in, sent[3]);
+  give(in, sent[4]);
+  EXPECT_EQ(got, (std::vector<Step>{0, 1}));
+  EXPECT_EQ(in.upto(), 1) << "values count only when everything before them has arrived";
+  EXPECT_EQ(in.duplicates(), 1u);
+  std::vector<std::vector<std::byte>> questions, answers;
+  in.collect(questions);
+  ASSERT_EQ(questions.size(), 1u) << "a gap makes the receiver ask";
+  give(out, questions[0]);
+  out.collect(answers);
+  ASSERT_EQ(answers.size(), 3u) << "what was acknowledged is not repeated";
+  for (const auto& bytes : answers) give(in, bytes);
+  EXPECT_EQ(got, (std::vector<Step>{0, 1, 2, 3, 4}));
+  EXPECT_EQ(in.upto(), 4);
+  EXPECT_EQ(in.final_step(), 3);
+}
+
+TEST(NearSets, WithoutAFrameSleepersStayAndNobodyElse) {
+  const auto body = [](BodyId id, bool asleep) {
+    BodyState b;
+    b.id = id;
+    if (asleep) b.flags |= kAsleep;
+    return b;
+  };
+  ContactRecord of_sleeper, of_awake;
+  of_sleeper.a = 1, of_sleeper.b = 2, of_awake.a = 3, of_awake.b = kStaticBit | 9;
+  const BodySet now{{body(1, true), body(2, true), body(3, false)}, {of_sleeper, of_awake}};
+  border::ToldBodies told;
+  border::HeardBodies heard;
+  EXPECT_TRUE(told.must_tell(now));
+  heard.hear(0, now);
+  bool was_told = false;
+  EXPECT_TRUE(border::same(heard.at(0, was_told), now));
+  EXPECT_TRUE(was_told);
+  const BodySet sleepers{{body(1, true), body(2, true)}, {of_sleeper}};
+  EXPECT_FALSE(told.must_tell(sleepers)) << "the other side assumes just this";
+  EXPECT_TRUE(border::same(heard.at(1, was_told), sleepers));
+  EXPECT_FALSE(was_told);
+  EXPECT_TRUE(told.must_tell({})) << "to take sleepers back, a frame is needed";
+}
+
+}  // namespace
+}  // namespace soda::test
