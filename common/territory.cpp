@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace soda {
 namespace {
@@ -46,12 +47,13 @@ class Bisector {
         for (std::int32_t x = r.low[0]; x < r.high[0]; ++x) f(Cell{x, y, z});
   }
 
-  // Of the three axes' cuts that come nearest to the wanted share of bodies, the one across the longest extent unless
-  // another is clearly better balanced: short borders, equal loads. Integers only, so that every process agrees.
+  // The cut that costs least: bodies on the wrong side are work that one half does while the other waits; bodies in the
+  // cells along the cut are told to the other side, and their islands are solved by both. Where that says nothing (empty
+  // regions), short borders and even halves. Integers only, so that every process agrees.
   Cut best_cut(const Region& region, WorldId lower, WorldId count) const {
     Cut best;
     bool found = false;
-    std::uint64_t best_cost = 0;
+    std::pair<std::uint64_t, std::uint64_t> best_cost;
     for (int axis = 0; axis < 3; ++axis) {
       const std::int32_t length = region.high[axis] - region.low[axis];
       if (length < 2) continue;
@@ -65,12 +67,11 @@ class Bisector {
         below += slice[i - 1];
         // Each side must have a cell for each of its worlds.
         if (face * i < lower || face * (length - i) < count - lower) continue;
-        const std::uint64_t wanted = total * lower, got = below * count;
-        const std::uint64_t error = (wanted > got ? wanted - got : got - wanted) / count;  // bodies on the wrong side
-        // Then even halves by length, for empty regions; then the longest axis.
-        const std::int64_t off = std::abs(2 * static_cast<std::int64_t>(i) - length);
-        const std::uint64_t tolerance = total / 50 + 1;  // 2 % of the bodies are not worth a long border
-        const std::uint64_t cost = (error / tolerance) * 1'000'000 + static_cast<std::uint64_t>(face) * 10 + off;
+        const std::uint64_t wanted = total * lower / count;
+        const std::uint64_t misplaced = wanted > below ? wanted - below : below - wanted;
+        const std::uint64_t near = slice[i - 1] + slice[i];
+        const auto uneven = static_cast<std::uint64_t>(std::abs(2 * static_cast<std::int64_t>(i) - length));
+        const std::pair cost{2 * misplaced + near, 10 * face + uneven};
         if (!found || cost < best_cost) best = {axis, region.low[axis] + i}, best_cost = cost, found = true;
       }
     }

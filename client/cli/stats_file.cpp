@@ -22,7 +22,7 @@ class Object {
   void add(std::string_view key, const T& value) {
     raw(key, fmt::format("{}", value));
   }
-  void add(std::string_view key, double value) { raw(key, fmt::format("{:.6f}", value)); }
+  void add(std::string_view key, double value) { raw(key, fmt::format("{}", value)); }
   void add(std::string_view key, bool value) { raw(key, value ? "true" : "false"); }
   void text(std::string_view key, std::string_view value) { raw(key, quoted(value)); }
   void raw(std::string_view key, std::string_view json) {

@@ -43,7 +43,7 @@ sdf::ElementPtr child(const sdf::ElementPtr& element, const char* name) {
   return found->GetExplicitlySetInFile() ? found : nullptr;
 }
 
-// An ellipsoid by 182 points of its surface.
+// An ellipsoid by 178 points of its surface.
 ConvexHull ellipsoid(const Vec3& radii) {
   constexpr int kRings = 12, kSegments = 16;
   constexpr double kPi = 3.14159265358979323846;

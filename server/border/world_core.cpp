@@ -31,6 +31,7 @@ class WorldCore::Impl {
     for (const BodyState& body : model.initial_state().bodies)
       if (neighbourhood_.owner(body) == settings.me) own.bodies.push_back(body);
     take_state(std::move(own));
+    finalise();  // state 0 is the scene
   }
 
   bool receive(std::span<const std::byte> bytes) {

@@ -48,6 +48,7 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core.me = settings.me;
   core.epoch = settings.epoch;
   core.session = settings.instance;
+  core.session = settings.instance;
   core.last_step = settings.last_step;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);

@@ -58,7 +58,7 @@ HeightField waves(std::uint32_t side, double spacing, double amplitude) {
   return field;
 }
 
-Scene piles_case() { return with_meteor(generate("piles", 81, 1), 90); }
+Scene piles_case() { return with_meteor(generate("piles", 135, 1), 90); }
 Scene heap_case() { return generate("heap", 200, 2); }
 Scene city_case() { return generate("city", 160, 3); }
 Scene towers_case() { return with_meteor(generate("towers", 90, 3), 20); }
