@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
-#include <utility>
+#include <tuple>
 
 namespace soda {
 namespace {
@@ -18,8 +18,9 @@ struct Region {
 
 class Bisector {
  public:
-  Bisector(const Grid& grid, const std::vector<std::uint32_t>& weight, std::vector<WorldId>& owner)
-      : grid_(grid), weight_(weight), owner_(owner) {}
+  // `last_axis` is cut only where no other can be; -1: all axes are alike.
+  Bisector(const Grid& grid, const std::vector<std::uint32_t>& weight, int last_axis, std::vector<WorldId>& owner)
+      : grid_(grid), weight_(weight), last_axis_(last_axis), owner_(owner) {}
 
   void split(const Region& region, WorldId first, WorldId count) {
     if (count == 1) {
@@ -53,7 +54,7 @@ class Bisector {
   Cut best_cut(const Region& region, WorldId lower, WorldId count) const {
     Cut best;
     bool found = false;
-    std::pair<std::uint64_t, std::uint64_t> best_cost;
+    std::tuple<bool, std::uint64_t, std::uint64_t> best_cost;
     for (int axis = 0; axis < 3; ++axis) {
       const std::int32_t length = region.high[axis] - region.low[axis];
       if (length < 2) continue;
@@ -71,7 +72,7 @@ class Bisector {
         const std::uint64_t misplaced = wanted > below ? wanted - below : below - wanted;
         const std::uint64_t near = slice[i - 1] + slice[i];
         const auto uneven = static_cast<std::uint64_t>(std::abs(2 * static_cast<std::int64_t>(i) - length));
-        const std::pair cost{2 * misplaced + near, 10 * face + uneven};
+        const std::tuple cost{axis == last_axis_, 2 * misplaced + near, 10 * face + uneven};
         if (!found || cost < best_cost) best = {axis, region.low[axis] + i}, best_cost = cost, found = true;
       }
     }
@@ -81,8 +82,17 @@ class Bisector {
 
   const Grid& grid_;
   const std::vector<std::uint32_t>& weight_;
+  int last_axis_;
   std::vector<WorldId>& owner_;
 };
+
+// Whatever hangs in the air at the start comes down: an upper half would soon be empty.
+int axis_of_gravity(const Vec3& gravity) {
+  if (gravity.isZero(0)) return -1;
+  int axis = 0;
+  gravity.cwiseAbs().maxCoeff(&axis);
+  return axis;
+}
 
 }  // namespace
 
@@ -96,7 +106,7 @@ TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds) {
     if (!body.is_static)
       ++weight[grid.index(grid.cell_of(body.pose.position + body.pose.orientation * body.inertial.centre))];
   TerritoryMap map{grid, worlds, std::vector<WorldId>(grid.cells(), 0)};
-  Bisector(grid, weight, map.owner).split({{0, 0, 0}, {grid.size[0], grid.size[1], grid.size[2]}}, 0, worlds);
+  Bisector(grid, weight, axis_of_gravity(scene.gravity), map.owner).split({{0, 0, 0}, {grid.size[0], grid.size[1], grid.size[2]}}, 0, worlds);
   return map;
 }
 

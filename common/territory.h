@@ -17,7 +17,8 @@ struct TerritoryMap {
 };
 
 // Recursive bisection of the grid, weighted by the dynamic bodies' initial cells: boxes of cells with about the same
-// number of bodies each. Every world gets at least one cell. A pure function of its arguments.
+// number of bodies each, cut where few bodies are, and upright. Every world gets at least one cell. A pure function of
+// its arguments.
 // Throws std::invalid_argument when there are more worlds than cells.
 TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds);
 

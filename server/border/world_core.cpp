@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <iterator>
 #include <limits>
 #include <set>
 #include <utility>
@@ -192,29 +193,32 @@ class WorldCore::Impl {
   // Everything known at the clock: what was produced here and what was heard.
   void gather() {
     const BodySet& produced = states_.back().set;
-    if (links_.empty()) {
-      known_.bodies = produced.bodies;
-      previous_ = &produced;
-      return;
-    }
-    gathered_.clear();
-    gathered_.bodies = produced.bodies;
-    gathered_.contacts = produced.contacts;
+    heard_now_.clear();
     for (HeardBodies& heard : heard_) {
       bool told = false;
       const BodySet& set = heard.at(clock_, told);
       if (told)
         for (const BodyState& body : set.bodies) stats_.arrived += neighbourhood_.owner(body) == settings_.me;
-      gathered_.bodies.insert(gathered_.bodies.end(), set.bodies.begin(), set.bodies.end());
-      gathered_.contacts.insert(gathered_.contacts.end(), set.contacts.begin(), set.contacts.end());
+      heard_now_.bodies.insert(heard_now_.bodies.end(), set.bodies.begin(), set.bodies.end());
+      heard_now_.contacts.insert(heard_now_.contacts.end(), set.contacts.begin(), set.contacts.end());
     }
-    std::sort(gathered_.bodies.begin(), gathered_.bodies.end(),
-              [](const BodyState& l, const BodyState& r) { return l.id < r.id; });
+    if (heard_now_.bodies.empty()) {
+      known_.bodies = produced.bodies;
+      previous_ = &produced;
+      return;
+    }
+    const auto lower_id = [](const BodyState& l, const BodyState& r) { return l.id < r.id; };
+    std::sort(heard_now_.bodies.begin(), heard_now_.bodies.end(), lower_id);
+    std::sort(heard_now_.contacts.begin(), heard_now_.contacts.end(), record_before);
+    gathered_.clear();
+    std::merge(produced.bodies.begin(), produced.bodies.end(), heard_now_.bodies.begin(), heard_now_.bodies.end(),
+               std::back_inserter(gathered_.bodies), lower_id);
+    std::merge(produced.contacts.begin(), produced.contacts.end(), heard_now_.contacts.begin(),
+               heard_now_.contacts.end(), std::back_inserter(gathered_.contacts), record_before);
     for (std::size_t i = 1; i < gathered_.bodies.size(); ++i)
       if (gathered_.bodies[i].id == gathered_.bodies[i - 1].id)
         throw ProtocolError("body " + std::to_string(gathered_.bodies[i].id) + " was produced twice at step " +
                             std::to_string(clock_));
-    std::sort(gathered_.contacts.begin(), gathered_.contacts.end(), record_before);
     known_.bodies = gathered_.bodies;
     previous_ = &gathered_;
   }
@@ -473,7 +477,8 @@ class WorldCore::Impl {
   std::vector<Part> later_parts_;
 
   // The step at hand.
-  BodySet gathered_, known_;           // at the clock; known_ is advanced in place
+  BodySet heard_now_, gathered_;       // from others; and together with what was produced here
+  BodySet known_;                      // at the clock, advanced in place
   const BodySet* previous_ = nullptr;  // bodies at the clock with the records of the step before
   std::vector<std::uint8_t> own_, roles_, in_mixed_;
   std::vector<physics::Ends> ends_, mixed_ends_;

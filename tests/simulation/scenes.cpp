@@ -10,7 +10,7 @@ namespace soda::test {
 namespace {
 
 Scene piles() { return generate("piles", 162, 3); }
-Scene heap() { return generate("heap", 120, 5); }
+Scene heap() { return generate("heap", 420, 5); }
 Scene cubes() { return generate("cubes", 150, 11); }
 Scene city() { return generate("city", 240, 2); }
 Scene cluster() { return generate("cluster", 108, 4); }
@@ -76,7 +76,7 @@ Scene corner() {
 
 const std::vector<HardScene>& hard_scenes() {
   static const std::vector<HardScene> scenes = {
-      {"piles", piles, 150, false},        {"heap", heap, 150, true},        {"cubes", cubes, 200, true},
+      {"piles", piles, 150, false},        {"heap", heap, 150, true},        {"cubes", cubes, 200, false},
       {"city", city, 150, true},           {"cluster", cluster, 200, true},  {"sleeping_chain", sleeping_chain, 200, true},
       {"wide_bodies", wide_bodies, 150, true}, {"fast_bodies", fast_bodies, 150, false}, {"corner", corner, 200, true},
   };

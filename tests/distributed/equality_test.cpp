@@ -1,0 +1,85 @@
+// The invariant, over real processes and DDS: a run on any number of worlds has the hashes of the run on one, at every
+// step. The reference is `--sync single`: one process, no network.
+#include <gtest/gtest.h>
+
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/distributed/session.h"
+
+namespace soda::test {
+namespace {
+
+struct Case {
+  const char* scene;     // a generator, or an SDF file of tests/data
+  std::uint32_t bodies;  // to generate
+  std::vector<int> worlds;
+  // From this number of worlds on, islands of several worlds must occur, and bodies must cross borders: a run in which
+  // nothing happened at borders proves nothing.
+  int mixes_from = 2, crosses_from = 2;
+};
+
+void PrintTo(const Case& c, std::ostream* out) { *out << c.scene; }
+
+std::string name_of(const ::testing::TestParamInfo<Case>& info) {
+  std::string name = info.param.scene;
+  return name.substr(0, name.find('.'));
+}
+
+class Equality : public SessionTest, public ::testing::WithParamInterface<Case> {};
+
+constexpr int kSteps = 600;
+
+TEST_P(Equality, AnyNumberOfWorldsGivesTheHashesOfOne) {
+  const Case& c = GetParam();
+  const bool is_file = std::string(c.scene).find('.') != std::string::npos;
+  const std::string file = is_file ? std::string(SODA_TEST_DATA) + "/" + c.scene : scene(c.scene, c.bodies);
+  const std::string steps = std::to_string(kSteps);
+  run({"run", file, "--sync", "single", "--steps", steps, "--pace", "max", "-q", "--hash-log", path("single.log"),
+       "--dump", path("single.dump")},
+      0, 900s);
+  const auto reference = lines_of(path("single.log"));
+  ASSERT_EQ(reference.size(), kSteps + 1u);
+  // "STEP BODIES HASH": the number of bodies stays, and the hashes say that something moves.
+  std::istringstream first(reference.front()), last(reference.back());
+  std::string step, bodies_first, bodies_last, hash_first, hash_last;
+  first >> step >> bodies_first >> hash_first;
+  last >> step >> bodies_last >> hash_last;
+  EXPECT_EQ(bodies_first, bodies_last);
+  EXPECT_NE(hash_first, hash_last);
+
+  for (const int worlds : c.worlds) {
+    SCOPED_TRACE(std::to_string(worlds) + " worlds");
+    const std::string n = std::to_string(worlds);
+    run({"run", file, "--worlds", n, "--steps", steps, "--pace", "max", "-q", "--hash-log", path(n + ".log"), "--stats",
+         path(n + ".json"), "--dump", path(n + ".dump")},
+        0, 900s);
+    expect_equal_logs(path("single.log"), path(n + ".log"));
+    run({"diff", path("single.log"), path(n + ".log")});
+    run({"diff", path("single.dump"), path(n + ".dump")});  // sleep counters and contact records, too
+    if (worlds >= c.mixes_from) EXPECT_GT(stat(path(n + ".json"), "mixed_islands"), 0);
+    if (worlds >= c.crosses_from) EXPECT_GT(stat(path(n + ".json"), "arrived"), 0);
+    if (HasFailure()) return;
+  }
+}
+
+constexpr int kNever = 1000;
+
+INSTANTIATE_TEST_SUITE_P(Sample, Equality,
+                         ::testing::Values(Case{"cubes", 500, {1, 2, 3, 8}}, Case{"piles", 540, {2, 4}},
+                                           Case{"heap", 300, {3, 4}, 2, 4}, Case{"towers", 300, {4, 8}, 3, 8},
+                                           Case{"city", 600, {2, 3, 4}}, Case{"dominoes", 400, {2, 8}},
+                                           Case{"cluster", 240, {4, 8}}, Case{"nested.sdf", 0, {2, 3}, kNever, kNever}),
+                         name_of);
+
+INSTANTIATE_TEST_SUITE_P(All, Equality,
+                         ::testing::Values(Case{"cubes", 4000, {1, 2, 3, 4, 8}}, Case{"piles", 2700, {1, 2, 3, 4, 8}},
+                                           Case{"heap", 1500, {1, 2, 3, 4, 8}}, Case{"towers", 2000, {1, 2, 3, 4, 8}, 3, 8},
+                                           Case{"city", 4000, {1, 2, 3, 4, 8}}, Case{"dominoes", 2000, {1, 2, 3, 4, 8}},
+                                           Case{"cluster", 1600, {1, 2, 3, 4, 8}},
+                                           Case{"nested.sdf", 0, {1, 2, 3, 4, 8}, kNever, kNever}),
+                         name_of);
+
+}  // namespace
+}  // namespace soda::test
