@@ -45,9 +45,12 @@ std::vector<WorldId> parse_worlds(const std::string& text) {
   const char* what = "worlds are 'none' or a list like 0,2-5";
   std::vector<WorldId> worlds;
   if (text == "none") return worlds;
-  for (std::string_view rest = text; !rest.empty() || worlds.empty();) {
-    const std::string_view item = rest.substr(0, rest.find(','));
-    rest.remove_prefix(std::min(rest.size(), item.size() + 1));
+  std::string_view rest = text;
+  for (bool more = true; more;) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view item = rest.substr(0, comma);
+    more = comma != std::string_view::npos;
+    if (more) rest.remove_prefix(comma + 1);
     const std::size_t dash = item.find('-');
     const WorldId first = number<WorldId>(item.substr(0, dash), text, what);
     const WorldId last = dash == std::string_view::npos ? first : number<WorldId>(item.substr(dash + 1), text, what);

@@ -72,7 +72,7 @@ void set_transports(const NetworkOptions& options, fdds::DomainParticipantQos& q
   } else if (options.interface != "all") {
     in_addr address{};
     if (inet_pton(AF_INET, options.interface.c_str(), &address) != 1)
-      throw std::runtime_error("--interface: neither 'local', 'all' nor an IPv4 address: " + options.interface);
+      throw std::invalid_argument("--interface: neither 'local', 'all' nor an IPv4 address: " + options.interface);
     udp->interfaceWhiteList.push_back(options.interface);
   }
   qos.transport().user_transports.push_back(udp);
@@ -87,11 +87,11 @@ void set_discovery(const NetworkOptions& options, fdds::DomainParticipantQos& qo
   int port = 0;
   if (colon != std::string::npos) port = std::atoi(options.discovery_server.c_str() + colon + 1);
   const std::string host = options.discovery_server.substr(0, colon);
-  if (port <= 0 || port > 65535) throw std::runtime_error("--discovery-server: not HOST:PORT: " + options.discovery_server);
+  if (port <= 0 || port > 65535) throw std::invalid_argument("--discovery-server: not HOST:PORT: " + options.discovery_server);
   const auto [v4, v6] = frtps::IPLocator::resolveNameDNS(host);
   in_addr literal{};
   const bool is_address = inet_pton(AF_INET, host.c_str(), &literal) == 1;
-  if (!is_address && v4.empty()) throw std::runtime_error("--discovery-server: unknown host: " + host);
+  if (!is_address && v4.empty()) throw std::invalid_argument("--discovery-server: unknown host: " + host);
   frtps::Locator_t locator(LOCATOR_KIND_UDPv4, static_cast<std::uint32_t>(port));
   frtps::IPLocator::setIPv4(locator, is_address ? host : *v4.begin());
   eprosima::fastdds::rtps::RemoteServerAttributes server;
@@ -220,6 +220,8 @@ WriterBase::~WriterBase() {
   impl_->writer->set_listener(nullptr);
   impl_->publisher->delete_datawriter(impl_->writer);
 }
+
+WriterKey WriterBase::key() const { return key_of(impl_->writer->get_instance_handle()); }
 
 bool WriterBase::matched() const { return impl_->readers.load() > 0; }
 

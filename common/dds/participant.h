@@ -28,7 +28,7 @@ namespace soda::dds {
 
 class Participant {
  public:
-  // Throws std::runtime_error when the network cannot be used as the options say. `name` is for tools and logs.
+  // Throws std::invalid_argument for options that make no sense, std::runtime_error when the network cannot be used so. `name` is for tools and logs.
   Participant(const NetworkOptions& options, const std::string& session, const std::string& name);
   ~Participant();
   Participant(const Participant&) = delete;
@@ -53,6 +53,7 @@ class WriterBase {
   WriterBase(const WriterBase&) = delete;
   WriterBase& operator=(const WriterBase&) = delete;
 
+  WriterKey key() const;
   bool matched() const;  // is there a reader?
   // Whether all that was written has been acknowledged by all readers there are, waiting for it as long as that.
   bool wait_acknowledged(std::chrono::milliseconds at_most);

@@ -1,6 +1,7 @@
 #include "server/border/world_core.h"
 
 #include <algorithm>
+#include <cstring>
 #include <deque>
 #include <iterator>
 #include <limits>
@@ -15,6 +16,28 @@
 #include "server/physics/stepper.h"
 
 namespace soda::border {
+namespace {
+
+// Keeps the elements whose position `wanted` says yes to, in order; in runs, for they are large and most are kept.
+template <typename T, typename Wanted>
+void keep(std::vector<T>& all, Wanted&& wanted) {
+  std::size_t to = 0;
+  for (std::size_t from = 0; from < all.size();) {
+    if (!wanted(from)) {
+      ++from;
+      continue;
+    }
+    std::size_t end = from + 1;
+    while (end < all.size() && wanted(end)) ++end;
+    if (to != from) std::memmove(&all[to], &all[from], (end - from) * sizeof(T));
+    to += end - from;
+    from = end;
+  }
+  all.resize(to);
+}
+
+}  // namespace
+
 class WorldCore::Impl {
  public:
   Impl(const physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer)
@@ -204,23 +227,18 @@ class WorldCore::Impl {
     }
     if (heard_now_.bodies.empty()) {
       known_.bodies = produced.bodies;
-      previous_ = &produced;
       return;
     }
     const auto lower_id = [](const BodyState& l, const BodyState& r) { return l.id < r.id; };
     std::sort(heard_now_.bodies.begin(), heard_now_.bodies.end(), lower_id);
     std::sort(heard_now_.contacts.begin(), heard_now_.contacts.end(), record_before);
-    gathered_.clear();
+    known_.bodies.resize(produced.bodies.size() + heard_now_.bodies.size());
     std::merge(produced.bodies.begin(), produced.bodies.end(), heard_now_.bodies.begin(), heard_now_.bodies.end(),
-               std::back_inserter(gathered_.bodies), lower_id);
-    std::merge(produced.contacts.begin(), produced.contacts.end(), heard_now_.contacts.begin(),
-               heard_now_.contacts.end(), std::back_inserter(gathered_.contacts), record_before);
-    for (std::size_t i = 1; i < gathered_.bodies.size(); ++i)
-      if (gathered_.bodies[i].id == gathered_.bodies[i - 1].id)
-        throw ProtocolError("body " + std::to_string(gathered_.bodies[i].id) + " was produced twice at step " +
+               known_.bodies.begin(), lower_id);
+    for (std::size_t i = 1; i < known_.bodies.size(); ++i)
+      if (known_.bodies[i].id == known_.bodies[i - 1].id)
+        throw ProtocolError("body " + std::to_string(known_.bodies[i].id) + " was produced twice at step " +
                             std::to_string(clock_));
-    known_.bodies = gathered_.bodies;
-    previous_ = &gathered_;
   }
 
   void find_islands() {
@@ -249,12 +267,12 @@ class WorldCore::Impl {
         hearers_of_part.insert(owner);
       }
     }
-    stepper_.find_contacts(*previous_, roles_, known_.contacts);
+    const physics::Stepper::Records previous[] = {states_.back().set.contacts, heard_now_.contacts};
+    stepper_.find_contacts(known_.bodies, previous, roles_, known_.contacts);
     stepper_.find_islands(known_.bodies, known_.contacts, ends_, islands_);
 
     // Islands of our own alone, and components of islands that others share.
     local_.clear();
-    component_island_.clear();
     Part part;
     part.origin = settings_.me;
     part.step = part.through = clock_;
@@ -281,7 +299,6 @@ class WorldCore::Impl {
       }
       for (const std::uint32_t c : islands_.contacts_of(k)) component.set.contacts.push_back(known_.contacts[c]);
       part.components.push_back(std::move(component));
-      component_island_.push_back(k);
     }
     // Every part of a step goes out before any is waited for.
     for (const WorldId world : hearers_of_part)
@@ -296,7 +313,7 @@ class WorldCore::Impl {
     for (std::uint32_t i = 0; i < part.components.size(); ++i) open_.push_back(i);
     mixed_.add(std::move(part));
     new_parts_ = true;
-    mixed_contacts_.clear();
+    unknown_contacts_.clear();
   }
 
   void solve_mixed() {
@@ -354,8 +371,14 @@ class WorldCore::Impl {
       own_ids.push_back(body.id);
     }
     stats_.mixed_islands += ours && others;
-    for (const ContactRecord& record : island.contacts)
-      if (std::binary_search(own_ids.begin(), own_ids.end(), record.a)) mixed_contacts_.push_back(record);
+    for (const ContactRecord& record : island.contacts) {
+      if (!std::binary_search(own_ids.begin(), own_ids.end(), record.a)) continue;
+      const auto at = std::lower_bound(known_.contacts.begin(), known_.contacts.end(), record, record_before);
+      if (at != known_.contacts.end() && !record_before(record, *at))
+        *at = record;
+      else
+        unknown_contacts_.push_back(record);  // of an own wide body with one that is not near here
+    }
   }
 
   // All islands of the step are solved: the own bodies' results are the next state.
@@ -363,22 +386,14 @@ class WorldCore::Impl {
     BodySet next;
     if (!spare_.empty()) next = std::move(spare_.back()), spare_.pop_back();
     next.clear();
-    if (links_.empty()) {
-      next.bodies.swap(known_.bodies);
-      next.contacts.swap(known_.contacts);
-    } else {
-      in_mixed_.assign(known_.contacts.size(), 0);
-      for (const std::uint32_t k : component_island_)
-        for (const std::uint32_t c : islands_.contacts_of(k)) in_mixed_[c] = 1;
-      for (std::size_t i = 0; i < known_.bodies.size(); ++i)
-        if (own_[i]) next.bodies.push_back(known_.bodies[i]);
-      for (std::size_t c = 0; c < known_.contacts.size(); ++c)
-        if (!in_mixed_[c] && own_[ends_[c].a]) next.contacts.push_back(known_.contacts[c]);
-      if (!mixed_contacts_.empty()) {
-        const auto middle = static_cast<std::ptrdiff_t>(next.contacts.size());
-        next.contacts.insert(next.contacts.end(), mixed_contacts_.begin(), mixed_contacts_.end());
-        std::sort(next.contacts.begin() + middle, next.contacts.end(), record_before);
-        std::inplace_merge(next.contacts.begin(), next.contacts.begin() + middle, next.contacts.end(), record_before);
+    next.bodies.swap(known_.bodies);
+    next.contacts.swap(known_.contacts);
+    if (!links_.empty()) {
+      keep(next.contacts, [&](std::size_t c) { return own_[ends_[c].a] != 0; });
+      keep(next.bodies, [&](std::size_t i) { return own_[i] != 0; });
+      if (!unknown_contacts_.empty()) {
+        next.contacts.insert(next.contacts.end(), unknown_contacts_.begin(), unknown_contacts_.end());
+        std::sort(next.contacts.begin(), next.contacts.end(), record_before);
       }
     }
     ++clock_;
@@ -408,18 +423,16 @@ class WorldCore::Impl {
 
   void tell(const BodySet& state) {
     std::vector<BodySet> sets(links_.size());
-    std::size_t contact = 0;
     for (const BodyState& body : state.bodies) {
-      const std::size_t first = contact;
-      while (contact < state.contacts.size() && state.contacts[contact].a == body.id) ++contact;
       neighbourhood_.hearers(body, hearers_);
       if (hearers_.empty()) continue;
+      const auto records = std::equal_range(state.contacts.begin(), state.contacts.end(), ContactRecord{.a = body.id},
+                                            [](const ContactRecord& l, const ContactRecord& r) { return l.a < r.a; });
       if (neighbourhood_.owner(body) != settings_.me) ++stats_.departed;
       for (std::size_t l = 0; l < links_.size(); ++l) {
         if (!std::binary_search(hearers_.begin(), hearers_.end(), links_[l].peer())) continue;
         sets[l].bodies.push_back(body);
-        sets[l].contacts.insert(sets[l].contacts.end(), state.contacts.begin() + static_cast<std::ptrdiff_t>(first),
-                                state.contacts.begin() + static_cast<std::ptrdiff_t>(contact));
+        sets[l].contacts.insert(sets[l].contacts.end(), records.first, records.second);
       }
     }
     for (std::size_t l = 0; l < links_.size(); ++l) {
@@ -477,17 +490,16 @@ class WorldCore::Impl {
   std::vector<Part> later_parts_;
 
   // The step at hand.
-  BodySet heard_now_, gathered_;       // from others; and together with what was produced here
-  BodySet known_;                      // at the clock, advanced in place
-  const BodySet* previous_ = nullptr;  // bodies at the clock with the records of the step before
-  std::vector<std::uint8_t> own_, roles_, in_mixed_;
+  BodySet heard_now_;  // from others
+  BodySet known_;      // together with what was produced here; contacts as found at the clock; advanced in place
+  std::vector<std::uint8_t> own_, roles_;
   std::vector<physics::Ends> ends_, mixed_ends_;
   physics::Islands islands_, mixed_islands_;
-  std::vector<std::uint32_t> local_, component_island_, mixed_all_;
+  std::vector<std::uint32_t> local_, mixed_all_;
   std::vector<std::uint32_t> open_;  // own components whose islands are not solved yet
   std::vector<WorldId> part_hearers_, hearers_;
   std::set<std::pair<WorldId, WorldId>> passed_on_;
-  std::vector<ContactRecord> mixed_contacts_;
+  std::vector<ContactRecord> unknown_contacts_;
 };
 
 WorldCore::WorldCore(const physics::Model& model, const TerritoryMap& map, const CoreSettings& settings,

@@ -13,6 +13,8 @@ constexpr double kFacePreference = 0.02;
 // Likewise: a corner on the edge of the other's face counts as on the face.
 constexpr double kClipTolerance = 0.004;
 constexpr double kParallelEdges = 1e-6;  // squared sine; such edges have no useful cross product
+// Squared cosine of 8 deg. Nearer than this to a face's normal, edges are left to the face: it has more points to offer.
+constexpr double kFaceLike = 0.98;
 
 struct Axis {
   int kind = 0;  // 0: face of a, 1: face of b, 2: edges
@@ -111,13 +113,15 @@ void box_box(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, cons
       const double squared_sine = 1 - turn(i, j) * turn(i, j);
       if (squared_sine < kParallelEdges) continue;
       const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-      // a_i x b_j in a's frame is (0, -turn(i2, j), turn(i1, j)) on axes (i, i1, i2).
+      // a_i x b_j in a's frame is (0, -turn(i2, j), turn(i1, j)) on axes (i, i1, i2), and likewise in b's.
+      const double steepest = std::max(std::max(size(i1, j), size(i2, j)), std::max(size(i, j1), size(i, j2)));
+      const bool face_like = steepest * steepest > kFaceLike * squared_sine;
       const double along = std::abs(t[i2] * turn(i1, j) - t[i1] * turn(i2, j));
       const double reach = half_a[i1] * size(i2, j) + half_a[i2] * size(i1, j) + half_b[j1] * size(i, j2) +
                            half_b[j2] * size(i, j1);
       const double separation = (along - reach) / std::sqrt(squared_sine);
       if (separation > max_distance) return;
-      if (separation > best.separation + preference) best = {2, i, j, separation};
+      if (!face_like && separation > best.separation + preference) best = {2, i, j, separation};
     }
 
   const double tolerance = kClipTolerance * smallest;

@@ -17,15 +17,24 @@ constexpr std::uint32_t kGroupMask = 0xff;
 constexpr double kSameNormal = 0.99;       // cosine; points whose normals agree this well share a record
 constexpr double kSamePointShare = 0.01;   // of the smaller half extent; nearer points are one
 
-bool hardly_turned(const double* then, const Quat& now) {
+// Squared sine of half the angle by which a body has turned since.
+double half_sine_squared(const double* then, const Quat& now) {
   const double dot = now.x() * then[0] + now.y() * then[1] + now.z() * then[2] + now.w() * then[3];
-  return dot * dot > kRecycleCosine * kRecycleCosine;  // dot = cos(angle / 2)
+  return std::max(0.0, 1 - dot * dot);
 }
 
-bool hardly_moved(const ContactRecord& record, const Party& a, const Party& b, double limit) {
-  const Vec3 offset = b.position - a.position;
-  return (offset - vec(record.offset)).squaredNorm() < limit * limit && hardly_turned(record.orientation_a, a.orientation) &&
-         hardly_turned(record.orientation_b, b.orientation);
+// Whether points found then still tell where the two touch. Three points and more are a whole face: that has to move away
+// or tilt visibly before others matter. One or two points, and those on a surface of triangles, tell nothing of the
+// corners further off, which may come down meanwhile: no corner may have moved so far.
+bool still_fit(const ContactRecord& record, const Party& a, const Party& b, double limit, bool whole_face) {
+  const double moved = (b.position - a.position - vec(record.offset)).squaredNorm();
+  const double turned_a = half_sine_squared(record.orientation_a, a.orientation);
+  const double turned_b = half_sine_squared(record.orientation_b, b.orientation);
+  if (whole_face && record.count >= 3)
+    return moved < limit * limit && turned_a < kRecycleHalfSine * kRecycleHalfSine &&
+           turned_b < kRecycleHalfSine * kRecycleHalfSine;
+  constexpr double kLimit = kRecycleCornerDistance * kRecycleCornerDistance;
+  return moved < kLimit && 4 * turned_a * a.radius * a.radius < kLimit && 4 * turned_b * b.radius * b.radius < kLimit;
 }
 
 double nearest_point(const ContactRecord& record, const Party& a, const Party& b) {
@@ -132,7 +141,7 @@ void ContactUpdater::update(const Party& a, const Party& b, std::span<const Cont
       while (end < previous.size() && (previous[end].part & ~kGroupMask) == pair) ++end;
       const auto old = previous.subspan(first, end - first);
       if (!old.empty() && keeps_anchors(a.children[i].kind) && keeps_anchors(b.children[j].kind) &&
-          hardly_moved(old[0], a, b, limit)) {
+          still_fit(old[0], a, b, limit, b.children[j].kind != ShapeKind::kConcave)) {
         double nearest = std::numeric_limits<double>::infinity();
         for (const ContactRecord& record : old) nearest = std::min(nearest, nearest_point(record, a, b));
         if (nearest <= max_distance) {

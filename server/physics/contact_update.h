@@ -20,6 +20,7 @@ struct Party {
   Mat3 rotation;    // of orientation
   std::span<const Child> children;
   double inner_extent;  // m, smallest half extent of its children
+  double radius;        // m, about the centre of mass; 0 of a static body, which does not turn
 };
 
 struct ContactCounters {

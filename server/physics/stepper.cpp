@@ -79,26 +79,26 @@ std::uint32_t Stepper::slot_of(BodyId id) const {
 Party Stepper::party(const BodyState& state, std::uint32_t slot) const {
   const BodyModel& m = *models_[slot];
   return {state.id, state.x(), state.q(), rotations_[slot], model_.shapes().children(m.first_child, m.children),
-          m.inner_extent};
+          m.inner_extent, m.radius};
 }
 
 Party Stepper::party(const StaticModel& fixed) const {
   // Only the dynamic body's size limits how long contacts are recycled.
   return {kStaticBit | fixed.id, fixed.pose.position, fixed.pose.orientation, fixed.rotation,
-          model_.shapes().children(fixed.first_child, fixed.children), std::numeric_limits<double>::infinity()};
+          model_.shapes().children(fixed.first_child, fixed.children), std::numeric_limits<double>::infinity(), 0};
 }
 
-void Stepper::place_bodies(const BodySet& set, std::span<const std::uint8_t> roles) {
-  const std::size_t n = set.bodies.size();
+void Stepper::place_bodies(std::span<const BodyState> bodies, std::span<const Records> previous,
+                           std::span<const std::uint8_t> roles) {
+  const std::size_t n = bodies.size();
   models_.resize(n);
   rotations_.resize(n);
   boxes_.resize(n);
   roles_.resize(n);
-  record_offsets_.assign(n + 1, 0);
+  previous_.assign(n, {});
   std::fill(slots_.begin(), slots_.end(), kStaticSlot);
-  std::size_t record = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    const BodyState& state = set.bodies[i];
+    const BodyState& state = bodies[i];
     models_[i] = model_.find(state.id);
     if (!models_[i]) throw std::invalid_argument("step: body " + std::to_string(state.id) + " is not in the scene");
     slots_[static_cast<std::size_t>(models_[i] - model_.bodies().data())] = static_cast<std::uint32_t>(i);
@@ -106,26 +106,35 @@ void Stepper::place_bodies(const BodySet& set, std::span<const std::uint8_t> rol
     boxes_[i] = reach_box(state, *models_[i], rotations_[i], model_);
     roles_[i] = roles.empty() ? std::uint8_t{kRoleWanted} : roles[i];
     if (!state.asleep()) roles_[i] |= kRoleAwake;
-    while (record < set.contacts.size() && set.contacts[record].a == state.id) ++record;
-    record_offsets_[i + 1] = static_cast<std::uint32_t>(record);
   }
+  for (const Records& records : previous)
+    for (std::size_t first = 0, end = 0; first < records.size(); first = end) {
+      while (end < records.size() && records[end].a == records[first].a) ++end;
+      if (const std::uint32_t slot = slot_of(records[first].a); slot != kStaticSlot)
+        previous_[slot] = records.subspan(first, end - first);
+    }
 }
 
 void Stepper::find_contacts(const BodySet& set, std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out) {
+  const Records previous = set.contacts;
+  find_contacts(set.bodies, std::span(&previous, 1), roles, out);
+}
+
+void Stepper::find_contacts(std::span<const BodyState> bodies, std::span<const Records> previous,
+                            std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out) {
   out.clear();
   StageClock clock(timing);
-  place_bodies(set, roles);
+  place_bodies(bodies, previous, roles);
   clock.lap(times.boxes);
   broad_.find(boxes_, roles_, broad_cell(model_), pairs_);
   clock.lap(times.broad);
-  for (std::uint32_t i = 0; i < set.bodies.size(); ++i) contacts_of(set, i, out);
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) contacts_of(bodies, i, out);
   clock.lap(times.narrow);
 }
 
-void Stepper::contacts_of(const BodySet& set, std::uint32_t body, std::vector<ContactRecord>& out) {
-  const BodyState& state = set.bodies[body];
-  const auto previous =
-      std::span(set.contacts).subspan(record_offsets_[body], record_offsets_[body + 1] - record_offsets_[body]);
+void Stepper::contacts_of(std::span<const BodyState> bodies, std::uint32_t body, std::vector<ContactRecord>& out) {
+  const BodyState& state = bodies[body];
+  const Records previous = previous_[body];
   const bool wanted = (roles_[body] & kRoleWanted) != 0;
   std::size_t next = 0;
   // Between two sleeping bodies nothing changes: their records stay as they are.
@@ -133,7 +142,7 @@ void Stepper::contacts_of(const BodySet& set, std::uint32_t body, std::vector<Co
     for (; next < previous.size() && previous[next].b < end; ++next) {
       if (!state.asleep()) continue;
       const std::uint32_t partner = slot_of(previous[next].b);
-      if (partner == kStaticSlot || !set.bodies[partner].asleep()) continue;
+      if (partner == kStaticSlot || !bodies[partner].asleep()) continue;
       if (wanted || (roles_[partner] & kRoleWanted) || (roles_[body] & roles_[partner] & kRoleWide))
         out.push_back(previous[next]);
     }
@@ -147,7 +156,7 @@ void Stepper::contacts_of(const BodySet& set, std::uint32_t body, std::vector<Co
   const Party self = party(state, body);
   const double own_reach = state.w().norm() * models_[body]->radius;
   for (const std::uint32_t partner : pairs_.of(body)) {
-    const BodyState& other = set.bodies[partner];
+    const BodyState& other = bodies[partner];
     keep_sleeping_until(other.id);
     const double approach =
         (state.v() - other.v()).norm() + own_reach + other.w().norm() * models_[partner]->radius;

@@ -43,8 +43,13 @@ class Stepper {
  public:
   explicit Stepper(const Model& model);
 
-  // 1. The records at the poses of `set` of all pairs that touch, in canonical order, into `out`. `roles` (BodyRole, one
-  // per body) say which pairs are wanted; kRoleAwake is filled in here. Without roles: all pairs.
+  // 1. The records at the poses of `bodies` (ascending by id) of all pairs that touch, in canonical order, into `out`.
+  // `previous` are the records of the step before, from one or several sources, each in canonical order and each with all
+  // the records of the bodies that it has any of. `roles` (BodyRole, one per body) say which pairs are wanted; kRoleAwake
+  // is filled in here. Without roles: all pairs.
+  using Records = std::span<const ContactRecord>;
+  void find_contacts(std::span<const BodyState> bodies, std::span<const Records> previous,
+                     std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out);
   void find_contacts(const BodySet& set, std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out);
 
   // 2. Islands of `bodies` (ascending by id) under `contacts`; every body named by a record must be there.
@@ -64,8 +69,9 @@ class Stepper {
   StageTimes times;
 
  private:
-  void place_bodies(const BodySet& set, std::span<const std::uint8_t> roles);
-  void contacts_of(const BodySet& set, std::uint32_t body, std::vector<ContactRecord>& out);
+  void place_bodies(std::span<const BodyState> bodies, std::span<const Records> previous,
+                    std::span<const std::uint8_t> roles);
+  void contacts_of(std::span<const BodyState> bodies, std::uint32_t body, std::vector<ContactRecord>& out);
   Party party(const BodyState& state, std::uint32_t slot) const;
   Party party(const StaticModel& fixed) const;
   std::uint32_t slot_of(BodyId id) const;  // kStaticSlot where the id is not in the set
@@ -84,7 +90,7 @@ class Stepper {
   std::vector<Mat3> rotations_;
   std::vector<Aabb> boxes_;
   std::vector<std::uint8_t> roles_;
-  std::vector<std::uint32_t> record_offsets_;
+  std::vector<Records> previous_;
   Pairs pairs_;
   std::vector<std::uint32_t> near_statics_;
   std::vector<std::uint32_t> slots_;  // by position in Model::bodies()

@@ -14,7 +14,9 @@ constexpr double kMatchDistance = 0.02;  // m; a point found this near to an old
 // anchors are what keeps tall stacks from creeping, and save most detections in resting scenes.
 constexpr double kRecycleDistance = 0.05;       // m, relative translation, at most
 constexpr double kRecycleExtentShare = 0.2;     // and at most this share of the smaller half extent of the two
-constexpr double kRecycleCosine = 0.99619469809174555;  // cos(5 deg): neither body has turned by more than 10 deg
+constexpr double kRecycleHalfSine = 0.08715574274765817;  // sin(5 deg): and neither body has turned by more than 10 deg.
+constexpr double kRecycleCornerDistance = 0.005;  // m; but contacts of one or two points last only this far (a quarter of
+                                                  // the speculative distance, beyond which other corners were not looked at)
 
 // ---- soft contacts (Catto, "Solver2D", 2024: soft constraints with sub-steps)
 constexpr double kContactHertzPerSubstepRate = 0.125;  // contact frequency as a share of the sub-step rate

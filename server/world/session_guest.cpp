@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "common/scene_hash.h"
@@ -72,6 +73,12 @@ SessionGuest::Offer& SessionGuest::offer(std::uint64_t instance) {
   return offers_[instance];
 }
 
+// So that world 0 can say in its log who came.
+void SessionGuest::tell_claim() const {
+  for (int i = 0; i < 20 && !join_->matched(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  join_->wait_acknowledged(std::chrono::seconds(1));
+}
+
 std::optional<SessionGuest::Admitted> SessionGuest::ready() const {
   for (const auto& [instance, offer] : offers_) {
     if (!offer.admission) continue;
@@ -87,9 +94,11 @@ std::optional<SessionGuest::Admitted> SessionGuest::ready() const {
       throw Refused("the scene that session '" + name_ + "' hands out is not the one that it describes");
     return admitted;
   }
-  if (offers_.empty() && other_protocol_ != 0)
+  if (offers_.empty() && other_protocol_ != 0) {
+    tell_claim();
     throw Refused("session '" + name_ + "' speaks protocol version " + std::to_string(other_protocol_) +
                   " and this daemon version " + std::to_string(claim_.protocol()) + ": use the same build everywhere");
+  }
   return std::nullopt;
 }
 

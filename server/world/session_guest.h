@@ -54,6 +54,7 @@ class SessionGuest {
   Offer& offer(std::uint64_t instance);
   std::optional<Admitted> ready() const;  // with the lock held; throws Refused
   void log_waiting() const;               // likewise
+  void tell_claim() const;
 
   const std::string name_;
   const wire::Join claim_;

@@ -43,13 +43,14 @@ SessionHost::SessionHost(dds::Participant& participant, const wire::Session& ses
     on_control_(control);
   });
   session_reader_ = std::make_unique<dds::Reader<wire::Session>>(
-      participant, dds::session_topic(), [this](wire::Session&& other, const dds::WriterKey&) { heard(other); });
+      participant, dds::session_topic(), [this](wire::Session&& other, const dds::WriterKey& writer) { heard(other, writer); });
   join_reader_ = std::make_unique<dds::Reader<wire::Join>>(
       participant, dds::join_topic(), [this](wire::Join&& claim, const dds::WriterKey&) { heard(claim); });
   dds::ReaderEvents events;
   events.on_liveliness = [this](const dds::WriterKey& writer, bool alive) {
     const std::lock_guard lock(mutex_);
     const auto known = status_writers_.find(writer);
+    spdlog::info("DEBUG liveliness alive={} known={}", alive, known != status_writers_.end());
     if (!alive && known != status_writers_.end()) service_->silent(known->second);
   };
   status_reader_ = std::make_unique<dds::Reader<wire::Status>>(
@@ -72,8 +73,8 @@ SessionHost::~SessionHost() {
   service_.reset();  // its thread uses the writers
 }
 
-void SessionHost::heard(const wire::Session& other) {
-  if (other.protocol() == session_.protocol() && other.instance() == session_.instance()) return;
+void SessionHost::heard(const wire::Session& other, const dds::WriterKey& writer) {
+  if (writer == session_writer_.key()) return;
   const bool was_first = other.protocol() != session_.protocol() || other.started() < session_.started() ||
                          (other.started() == session_.started() && other.instance() < session_.instance());
   if (!was_first) {

@@ -27,7 +27,7 @@ class SessionHost {
   void finish(std::chrono::milliseconds at_most);
 
  private:
-  void heard(const wire::Session& other);
+  void heard(const wire::Session& other, const dds::WriterKey& writer);
   void heard(const wire::Join& claim);
 
   const wire::Session session_;

@@ -58,8 +58,12 @@ TEST_P(Equality, AnyNumberOfWorldsGivesTheHashesOfOne) {
     expect_equal_logs(path("single.log"), path(n + ".log"));
     run({"diff", path("single.log"), path(n + ".log")});
     run({"diff", path("single.dump"), path(n + ".dump")});  // sleep counters and contact records, too
-    if (worlds >= c.mixes_from) EXPECT_GT(stat(path(n + ".json"), "mixed_islands"), 0);
-    if (worlds >= c.crosses_from) EXPECT_GT(stat(path(n + ".json"), "arrived"), 0);
+    if (worlds >= c.mixes_from) {
+      EXPECT_GT(stat(path(n + ".json"), "mixed_islands"), 0);
+    }
+    if (worlds >= c.crosses_from) {
+      EXPECT_GT(stat(path(n + ".json"), "arrived"), 0);
+    }
     if (HasFailure()) return;
   }
 }

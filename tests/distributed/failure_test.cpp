@@ -111,7 +111,8 @@ TEST_F(Failure, AnotherProtocolVersionIsRefusedByBothSides) {
                directory());
   Program stranger(soda_world({"--session", session, "--world", "1", "--pretend-protocol", "77"}), directory());
   expect_exit(stranger, 3, 30s);
-  EXPECT_NE(stranger.output().find("protocol version 77"), std::string::npos) << stranger.output();
+  EXPECT_NE(stranger.output().find("speaks protocol version 1 and this daemon version 77"), std::string::npos)
+      << stranger.output();
   EXPECT_TRUE(host.wrote("refused a daemon that wants to join: it speaks protocol version 77", 10s)) << host.output();
 
   const std::string other = new_session();

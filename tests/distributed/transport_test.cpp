@@ -1,0 +1,133 @@
+// Border messages over DDS: order, size, and honesty about what may have been lost.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <thread>
+
+#include "server/world/dds_transport.h"
+#include "tests/distributed/dds_test_support.h"
+
+namespace soda::world {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Two worlds, each with its own participant.
+class Transports : public ::testing::TestWithParam<bool> {
+ protected:
+  Transports() {
+    test::use_transports_within_process();
+    network_.shared_memory = GetParam();
+    network_.lease = 2;
+  }
+
+  struct End {
+    End(const dds::NetworkOptions& network, const std::string& session, WorldId me, WorldId other)
+        : participant(network, session, "test"), transport(participant, me) {
+      transport.open(std::span(&other, 1));
+    }
+    dds::Participant participant;
+    DdsTransport transport;
+  };
+  std::unique_ptr<End> make(WorldId me) const { return std::make_unique<End>(network_, session_, me, 1 - me); }
+
+  static bool meet(const End& a, const End& b) {
+    for (int i = 0; i < 1000 && !(a.transport.connected() && b.transport.connected()); ++i)
+      std::this_thread::sleep_for(10ms);
+    return a.transport.connected() && b.transport.connected();
+  }
+  // The next thing that comes.
+  static std::optional<Incoming> next(End& end, std::chrono::milliseconds within) {
+    const auto until = std::chrono::steady_clock::now() + within;
+    while (std::chrono::steady_clock::now() < until) {
+      if (auto incoming = end.transport.receive()) return incoming;
+      end.transport.wait(10ms);
+    }
+    return std::nullopt;
+  }
+  static std::vector<std::byte> message(std::size_t bytes, std::uint32_t number) {
+    std::vector<std::byte> m(bytes);
+    for (std::size_t i = 0; i < bytes; ++i) m[i] = static_cast<std::byte>((i * 2654435761u + number) >> 13);
+    return m;
+  }
+
+  dds::NetworkOptions network_;
+  const std::string session_ = test::unique_session();
+};
+
+TEST_P(Transports, EightMebibytesArriveWhole) {
+  auto a = make(0), b = make(1);
+  ASSERT_TRUE(meet(*a, *b));
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    const auto sent = message((std::size_t{8} << 20) + i, i);
+    a->transport.send(1, sent);
+    const auto got = next(*b, 20s);
+    ASSERT_TRUE(got) << i;
+    ASSERT_EQ(got->kind, Incoming::Kind::kMessage);
+    EXPECT_EQ(got->from, 0u);
+    EXPECT_TRUE(got->bytes == sent) << i;
+  }
+}
+
+TEST_P(Transports, ThousandsArriveInOrder) {
+  auto a = make(0), b = make(1);
+  ASSERT_TRUE(meet(*a, *b));
+  constexpr std::uint32_t kMessages = 5000;
+  std::uint32_t sent = 0, got = 0;
+  while (got < kMessages) {
+    for (; sent < kMessages && sent < got + 20; ++sent) a->transport.send(1, message(200, sent));
+    const auto incoming = next(*b, 5s);
+    ASSERT_TRUE(incoming) << got;
+    ASSERT_EQ(incoming->kind, Incoming::Kind::kMessage) << got;
+    ASSERT_TRUE(incoming->bytes == message(200, got)) << got;
+    ++got;
+  }
+}
+
+TEST_P(Transports, WhatIsSentBeforeTheMeetingArrives) {
+  auto a = make(0);
+  for (std::uint32_t i = 0; i < 10; ++i) a->transport.send(1, message(1000, i));
+  auto b = make(1);
+  for (std::uint32_t i = 0; i < 10; ++i) {
+    const auto got = next(*b, 10s);
+    ASSERT_TRUE(got) << i;
+    EXPECT_TRUE(got->bytes == message(1000, i)) << i;
+  }
+}
+
+TEST_P(Transports, ANeighbourThatComesBackIsAnInterruption) {
+  auto a = make(0), b = make(1);
+  ASSERT_TRUE(meet(*a, *b));
+  b.reset();
+  std::this_thread::sleep_for(200ms);
+  a->transport.send(1, message(100, 1));  // goes nowhere
+  b = make(1);
+  const auto got = next(*a, 10s);
+  ASSERT_TRUE(got);
+  EXPECT_EQ(got->kind, Incoming::Kind::kInterrupted);
+  EXPECT_EQ(got->from, 1u);
+  // From here on it works again.
+  ASSERT_TRUE(meet(*a, *b));
+  a->transport.send(1, message(100, 2));
+  for (;;) {
+    const auto incoming = next(*b, 10s);
+    ASSERT_TRUE(incoming);
+    if (incoming->bytes == message(100, 2)) break;
+  }
+}
+
+TEST_P(Transports, FlushWaitsForAcknowledgements) {
+  auto a = make(0), b = make(1);
+  ASSERT_TRUE(meet(*a, *b));
+  for (std::uint32_t i = 0; i < 20; ++i) a->transport.send(1, message(100000, i));
+  const auto began = std::chrono::steady_clock::now();
+  a->transport.flush(10s);
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 8s);
+  for (std::uint32_t i = 0; i < 20; ++i) ASSERT_TRUE(b->transport.receive()) << i;
+}
+
+INSTANTIATE_TEST_SUITE_P(Wire, Transports, ::testing::Values(true, false),
+                         [](const auto& test) { return test.param ? "SharedMemory" : "Udp"; });
+
+}  // namespace
+}  // namespace soda::world
