@@ -1,8 +1,10 @@
 #include "server/border/codec.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <string>
 #include <type_traits>
 
 namespace soda::border {
@@ -140,7 +142,32 @@ Part get_part(Reader& in, std::span<const std::byte>& rest, const physics::Model
   return part;
 }
 
+// Every contact is between bodies that are there; in a frame its partner may be elsewhere.
+void check_ends(const BodySet& set, const std::vector<Port>& ports, bool owner_only) {
+  const auto there = [&](BodyId id) {
+    return std::binary_search(set.bodies.begin(), set.bodies.end(), BodyState{.id = id},
+                              [](const BodyState& l, const BodyState& r) { return l.id < r.id; }) ||
+           std::any_of(ports.begin(), ports.end(), [&](const Port& p) { return p.body == id; });
+  };
+  for (const ContactRecord& c : set.contacts)
+    if (!there(c.a) || (!owner_only && !c.with_static() && !there(c.b)))
+      throw CodecError("contact of " + name(c.a) + ": its body is not in the set");
+}
+
 }  // namespace
+
+void check(const Message& message, WorldId me, WorldId worlds) {
+  for (const Frame& frame : message.frames) check_ends(frame.set, {}, true);
+  for (const Part& part : message.parts) {
+    if (part.origin >= worlds || part.origin == me)
+      throw CodecError("part: origin " + std::to_string(part.origin) + " cannot be");
+    for (const Component& component : part.components) {
+      for (const Port& port : component.ports)
+        if (port.owner >= worlds) throw CodecError("port: no world " + std::to_string(port.owner));
+      check_ends(component.set, component.ports, false);
+    }
+  }
+}
 
 void encode_set(const BodySet& set, std::vector<std::byte>& out) {
   put(out, static_cast<std::uint32_t>(set.bodies.size()));

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <span>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "server/border/message.h"
@@ -25,6 +24,10 @@ std::vector<std::byte> encode(const Message& message);
 // Throws CodecError for anything cut short, too long, out of order, not finite, or about bodies that `model` does not
 // have. What it returns can be trusted to be well-formed, not to be true.
 Message decode(std::span<const std::byte> bytes, const physics::Model& model);
+
+// Throws CodecError where a well-formed message does not fit a session of that many worlds: unknown owners, contacts
+// between bodies that are not there.
+void check(const Message& message, WorldId me, WorldId worlds);
 
 // The pieces, for those who store or measure them.
 void encode_set(const BodySet& set, std::vector<std::byte>& out);

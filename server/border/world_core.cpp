@@ -66,7 +66,7 @@ class WorldCore::Impl {
       if (h.to != settings_.me) throw CodecError("border message for world " + std::to_string(h.to));
       Link* link = link_to(h.from);
       if (!link) throw CodecError("border message from world " + std::to_string(h.from) + ", which is no neighbour");
-      check(message);
+      check(message, settings_.me, map_.worlds);
       const std::uint64_t before = link->duplicates();
       link->receive(std::move(message), [&](Message& m) { deliver(*link, m); });
       stats_.duplicates += link->duplicates() - before;
@@ -144,31 +144,6 @@ class WorldCore::Impl {
   }
 
   // ---- what comes in -------------------------------------------------------------------------------------------------
-  void check(const Message& message) const {
-    for (const Frame& frame : message.frames) check_ends(frame.set, {}, true);
-    for (const Part& part : message.parts) {
-      if (part.origin >= map_.worlds || part.origin == settings_.me)
-        throw CodecError("part: origin " + std::to_string(part.origin) + " cannot be");
-      for (const Component& component : part.components) {
-        for (const Port& port : component.ports)
-          if (port.owner >= map_.worlds) throw CodecError("port: no world " + std::to_string(port.owner));
-        check_ends(component.set, component.ports, false);
-      }
-    }
-  }
-
-  // Every contact is between bodies that are there; in a frame its partner may be elsewhere.
-  static void check_ends(const BodySet& set, const std::vector<Port>& ports, bool owner_only) {
-    const auto there = [&](BodyId id) {
-      return std::binary_search(set.bodies.begin(), set.bodies.end(), BodyState{.id = id},
-                                [](const BodyState& l, const BodyState& r) { return l.id < r.id; }) ||
-             std::any_of(ports.begin(), ports.end(), [&](const Port& p) { return p.body == id; });
-    };
-    for (const ContactRecord& c : set.contacts)
-      if (!there(c.a) || (!owner_only && !c.with_static() && !there(c.b)))
-        throw CodecError("contact of body " + std::to_string(c.a) + ": its body is not in the set");
-  }
-
   void deliver(const Link& link, Message& message) {
     const auto index = static_cast<std::size_t>(&link - links_.data());
     const Step upto = message.header.upto;

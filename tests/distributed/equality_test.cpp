@@ -12,7 +12,7 @@ namespace soda::test {
 namespace {
 
 struct Case {
-  const char* scene;     // a generator, or an SDF file of tests/data
+  const char* scene;     // a generator, or an SDF file of scenes/
   std::uint32_t bodies;  // to generate
   std::vector<int> worlds;
   // From this number of worlds on, islands of several worlds must occur, and bodies must cross borders: a run in which

@@ -60,7 +60,7 @@ TEST_P(Rest, SettlesOnTheSurfaceAndStays) {
   const Model model(scene);
   Stepper stepper(model);
   BodySet set = model.initial_state();
-  run(stepper, set, scene, 5);
+  run(stepper, set, scene, 8);
   const BodyState settled = set.bodies[0];
   EXPECT_GT(set.contacts.size(), 0u);
   EXPECT_LT(settled.x().head<2>().norm(), 0.5) << "thrown aside";
