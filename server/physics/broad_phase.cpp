@@ -81,25 +81,38 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
   const auto record = [&](std::uint32_t a, std::uint32_t b) {
     found_.push_back(a < b ? std::uint64_t{a} << 32 | b : std::uint64_t{b} << 32 | a);
   };
-  // Half of the neighbourhood: the own cell (later entries), the next in the row, and four rows of three.
-  constexpr int kRows[4][2] = {{1, 0}, {-1, 1}, {0, 1}, {1, 1}};  // y, z
-  for (std::uint32_t e = 0; e < entries_.size(); ++e) {
-    const Entry& entry = entries_[e];
-    const auto scan = [&](std::uint64_t k, std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z,
-                          std::uint32_t from) {
-      for (std::uint32_t o = std::max(first_of(k), from), end = end_of(k); o < end; ++o) {
-        const Entry& other = entries_[o];
-        if (other.x < x0 || other.x > x1 || other.y != y || other.z != z) continue;  // another cell in this bucket
-        if (wanted(entry.role, other.role) && entry.box.overlaps(other.box)) record(entry.body, other.body);
-      }
-    };
-    const std::uint64_t own = bucket(entry.x, entry.y, entry.z);
-    scan(own, entry.x, entry.x, entry.y, entry.z, e + 1);
-    scan((own + 1) & mask, entry.x + 1, entry.x + 1, entry.y, entry.z, 0);
-    for (const auto& row : kRows) {
-      const std::int32_t y = entry.y + row[0], z = entry.z + row[1];
-      const std::uint64_t k = bucket(entry.x - 1, y, z);
-      for (int d = 0; d < 3; ++d) scan((k + d) & mask, entry.x - 1 + d, entry.x - 1 + d, y, z, 0);
+  const auto scan = [&](const Entry& entry, std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t from,
+                        auto&& skip) {
+    const std::uint64_t k = bucket(x, y, z);
+    for (std::uint32_t o = std::max(first_of(k), from), end = end_of(k); o < end; ++o) {
+      const Entry& other = entries_[o];
+      if (other.x != x || other.y != y || other.z != z) continue;  // another cell in this bucket
+      if (!skip(o, other) && wanted(entry.role, other.role) && entry.box.overlaps(other.box))
+        record(entry.body, other.body);
+    }
+  };
+  const auto awake = [](const Entry& e) { return (e.role & kRoleAwake) != 0; };
+  const auto number_awake = static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), awake));
+  if (2 * number_awake < entries_.size()) {
+    // Mostly asleep: only those awake look around them, but all around. Two awake ones meet once.
+    for (std::uint32_t e = 0; e < entries_.size(); ++e) {
+      const Entry& entry = entries_[e];
+      if (!awake(entry)) continue;
+      for (std::int32_t z = entry.z - 1; z <= entry.z + 1; ++z)
+        for (std::int32_t y = entry.y - 1; y <= entry.y + 1; ++y)
+          for (std::int32_t x = entry.x - 1; x <= entry.x + 1; ++x)
+            scan(entry, x, y, z, 0, [&](std::uint32_t o, const Entry& other) { return o == e || (o < e && awake(other)); });
+    }
+  } else {
+    // Half of the neighbourhood: the own cell (later entries), the next in the row, and four rows of three.
+    constexpr int kRows[4][2] = {{1, 0}, {-1, 1}, {0, 1}, {1, 1}};  // y, z
+    const auto none = [](std::uint32_t, const Entry&) { return false; };
+    for (std::uint32_t e = 0; e < entries_.size(); ++e) {
+      const Entry& entry = entries_[e];
+      scan(entry, entry.x, entry.y, entry.z, e + 1, none);
+      scan(entry, entry.x + 1, entry.y, entry.z, 0, none);
+      for (const auto& row : kRows)
+        for (int d = -1; d <= 1; ++d) scan(entry, entry.x + d, entry.y + row[0], entry.z + row[1], 0, none);
     }
   }
   for (std::uint32_t l : large_)
