@@ -9,6 +9,8 @@
 #include "bench/commands.h"
 #include "common/scene/generators.h"
 #include "common/state_hash.h"
+#include "server/border/codec.h"
+#include "server/border/near_sets.h"
 #include "server/physics/stepper.h"
 
 namespace soda::bench {
@@ -104,7 +106,7 @@ void measure_round(const Scene& scene, const SceneCase& c, int blocks, bool ours
 }
 
 // What it costs to keep, bring back and compare a state, per body.
-void measure_state(const std::string& name, const BodySet& set, Headline& headline) {
+void measure_state(const std::string& name, const physics::Model& model, const BodySet& set, Headline& headline) {
   const double bodies = static_cast<double>(set.bodies.size());
   const std::size_t body_bytes = set.bodies.size() * sizeof(BodyState);
   const std::size_t contact_bytes = set.contacts.size() * sizeof(ContactRecord);
@@ -129,6 +131,17 @@ void measure_state(const std::string& name, const BodySet& set, Headline& headli
   headline.add(name + ".restore_ns_per_body", 1e9 * restore / bodies);
   headline.add(name + ".hash_ns_per_body", 1e9 * bodies_hashed / bodies);
   headline.add(name + ".full_hash_ns_per_body", 1e9 * all_hashed / bodies);
+
+  // A border frame that holds every body, with its contact records: to bytes, and back through the door.
+  border::Message message;
+  message.frames.push_back({0, {}, set});
+  std::vector<std::byte> bytes;
+  const double encoded = time_of([&] { bytes = border::encode(message); });
+  const double decoded = time_of([&] { message = border::decode(bytes, model); });
+  if (!border::same(message.frames[0].set, set)) throw std::runtime_error("a decoded frame differs");
+  headline.add(name + ".frame_bytes_per_body", static_cast<double>(bytes.size()) / bodies);
+  headline.add(name + ".frame_encode_ns_per_body", 1e9 * encoded / bodies);
+  headline.add(name + ".frame_decode_ns_per_body", 1e9 * decoded / bodies);
 }
 
 constexpr const char* kBars = R"(
@@ -221,7 +234,7 @@ void step(const Options& options, Headline& headline) {
       headline.add(name + ".sink_m", m.ours.sink);
       headline.add(name + ".sink_bullet_m", m.bullet.sink);
     }
-    measure_state(name, last, headline);
+    measure_state(name, physics::Model(scene), last, headline);
   }
   table.close();
   course.close();
