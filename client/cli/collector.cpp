@@ -86,7 +86,7 @@ void Collector::take(const wire::Status& status) {
     if (worlds_[status.world()].state() < wire::STATE_DONE) ended_ = now;
   }
   worlds_[status.world()] = status;
-  heard_[status.world()] = true;
+  heard_[status.world()] = now;
 }
 
 void Collector::take(const wire::Digests& digests) {

@@ -56,7 +56,8 @@ class Collector {
 
   const std::optional<wire::Session>& session() const { return session_; }
   const std::vector<wire::Status>& worlds() const { return worlds_; }  // by world; state PREPARING until heard of
-  bool heard_of(WorldId world) const { return world < heard_.size() && heard_[world]; }
+  // Time of a world's last status; none if it was not heard of.
+  std::optional<Clock::time_point> heard(WorldId world) const { return heard_.at(world); }
   Step whole_steps() const { return next_whole_; }  // digests of steps 0 .. whole_steps() - 1 are complete
   std::uint64_t bodies() const { return bodies_; }  // of the newest whole step
   std::optional<Clock::time_point> began() const { return began_; }  // the first world started
@@ -85,7 +86,7 @@ class Collector {
   std::deque<dds::Report> early_;  // heard before the session's description
   std::optional<wire::Session> session_;
   std::vector<wire::Status> worlds_;
-  std::vector<bool> heard_;
+  std::vector<std::optional<Clock::time_point>> heard_;
   std::vector<Step> next_;  // by world: the next digest expected
   std::deque<Sum> sums_;    // of steps next_whole_, ...
   Step next_whole_ = 0;

@@ -11,27 +11,8 @@ DdsSource::DdsSource(const dds::NetworkOptions& network, const std::string& sess
                     [this](wire::StateChunk&& sample, const dds::WriterKey&) { push(std::move(sample)); });
   digests_.emplace(participant_, dds::digests_topic(),
                    [this](wire::Digests&& sample, const dds::WriterKey&) { push(std::move(sample)); });
-  dds::ReaderEvents events;
-  events.on_liveliness = [this](const dds::WriterKey& writer, bool alive) {
-    const std::lock_guard lock(mutex_);
-    const auto known = status_writers_.find(writer);
-    if (known == status_writers_.end()) return;
-    if (alive)
-      silent_.erase(known->second);
-    else
-      silent_.insert(known->second);
-  };
-  status_.emplace(
-      participant_, dds::status_topic(),
-      [this](wire::Status&& sample, const dds::WriterKey& writer) {
-        {
-          const std::lock_guard lock(mutex_);
-          status_writers_[writer] = sample.world();
-          silent_.erase(sample.world());
-        }
-        push(std::move(sample));
-      },
-      events);
+  status_.emplace(participant_, dds::status_topic(),
+                  [this](wire::Status&& sample, const dds::WriterKey&) { push(std::move(sample)); });
   session_.emplace(participant_, dds::session_topic(),
                    [this](wire::Session&& sample, const dds::WriterKey&) { push(std::move(sample)); });
 }
@@ -50,11 +31,6 @@ std::optional<dds::Report> DdsSource::next(std::chrono::milliseconds at_most) {
   dds::Report first = std::move(queue_.front());
   queue_.pop_front();
   return first;
-}
-
-std::set<WorldId> DdsSource::silent() const {
-  const std::lock_guard lock(mutex_);
-  return silent_;
 }
 
 }  // namespace soda::cli

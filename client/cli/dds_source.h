@@ -3,7 +3,6 @@
 
 #include <condition_variable>
 #include <deque>
-#include <map>
 #include <mutex>
 #include <string>
 
@@ -18,7 +17,6 @@ class DdsSource final : public ReportSource {
   DdsSource(const dds::NetworkOptions& network, const std::string& session, bool with_states);
 
   std::optional<dds::Report> next(std::chrono::milliseconds at_most) override;
-  std::set<WorldId> silent() const override;
 
  private:
   void push(dds::Report report);
@@ -27,8 +25,6 @@ class DdsSource final : public ReportSource {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<dds::Report> queue_;
-  std::map<dds::WriterKey, WorldId> status_writers_;
-  std::set<WorldId> silent_;
   std::optional<dds::Reader<wire::StateChunk>> states_;
   std::optional<dds::Reader<wire::Digests>> digests_;
   std::optional<dds::Reader<wire::Status>> status_;

@@ -3,10 +3,8 @@
 
 #include <chrono>
 #include <optional>
-#include <set>
 
 #include "common/dds/frames.h"
-#include "common/ids.h"
 
 namespace soda::cli {
 
@@ -17,8 +15,6 @@ class ReportSource {
   virtual std::optional<dds::Report> next(std::chrono::milliseconds at_most) = 0;
   // Whether nothing can come any more.
   virtual bool closed() const { return false; }
-  // Worlds that were heard of, but not lately: stopped, or dead.
-  virtual std::set<WorldId> silent() const { return {}; }
 };
 
 class PipeSource final : public ReportSource {

@@ -37,7 +37,7 @@ class Follower {
         last_end = Clock::now();
         if (ended.exit_code != 0) return failed(ended);
       }
-      table_.update(collector_, source_.silent());
+      table_.update(collector_);
       if (own && processes_.running() == 0 && (source_.closed() || Clock::now() - last_end > kLastWords)) {
         table_.say("the daemons have ended, but not all that they computed was heard of");
         return kExitFailed;

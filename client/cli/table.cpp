@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <iterator>
 
+#include "common/dds/topics.h"
 #include "common/scene_hash.h"
 
 namespace soda::cli {
@@ -62,18 +63,18 @@ double Table::Speed::at(Clock::time_point now, Step final_now) {
   return steps_per_second;
 }
 
-void Table::update(const Collector& collector, const std::set<WorldId>& silent) {
+void Table::update(const Collector& collector) {
   const auto now = Clock::now();
   if (quiet_ || !collector.session() || now < next_) return;
   next_ = now + (terminal_ ? Clock::duration(kDrawEvery) : Clock::duration(kLineEvery));
   speeds_.resize(collector.worlds().size());
   if (terminal_)
-    draw(collector, silent, now);
+    draw(collector, now);
   else if (collector.began())
     print_line(collector, now);
 }
 
-void Table::draw(const Collector& collector, const std::set<WorldId>& silent, Clock::time_point now) {
+void Table::draw(const Collector& collector, Clock::time_point now) {
   std::vector<std::string> lines;
   lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9}  {}", "world", "cells", "bodies", "clock",
                               "final", "steps/s", "syncs", "waiting", "state"));
@@ -83,9 +84,10 @@ void Table::draw(const Collector& collector, const std::set<WorldId>& silent, Cl
     const wire::Status& s = worlds[i];
     const double speed = speeds_[i].at(now, s.final_step());
     if (lines.size() >= room && i + 1 < worlds.size()) continue;
-    const char* state = !collector.heard_of(s.world())   ? "not here yet"
-                        : silent.contains(s.world())      ? "silent"
-                                                          : state_name(s.state());
+    const auto heard = collector.heard(s.world());
+    const char* state = !heard                          ? "not here yet"
+                        : now - *heard > dds::kSilence ? "silent"
+                                                       : state_name(s.state());
     lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9.0f} {:>9} {:>8.2f}s  {}", s.world(), s.cells(),
                                 s.bodies(), s.clock(), s.final_step(), speed, s.syncs(), s.waiting_seconds(), state));
   }

@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -21,8 +20,8 @@ class Table {
   Table(const Table&) = delete;
   Table& operator=(const Table&) = delete;
 
-  // Draws if it is time to. `silent` worlds are marked.
-  void update(const Collector& collector, const std::set<WorldId>& silent);
+  // Draws if it is time to.
+  void update(const Collector& collector);
   // A line of text, above the table.
   void say(const std::string& line);
   // Takes the table away.
@@ -37,7 +36,7 @@ class Table {
     double at(Clock::time_point now, Step final_now);
   };
 
-  void draw(const Collector& collector, const std::set<WorldId>& silent, Clock::time_point now);
+  void draw(const Collector& collector, Clock::time_point now);
   void print_line(const Collector& collector, Clock::time_point now);
 
   const bool quiet_;

@@ -117,11 +117,6 @@ void set_flow(const Flow& flow, Qos& qos) {
   qos.resource_limits().allocated_samples = std::min(4, flow.max_samples);
   qos.endpoint().history_memory_policy = frtps::DYNAMIC_REUSABLE_MEMORY_MODE;
   qos.data_sharing().off();
-  if (flow.liveliness_lease.count() > 0) {
-    qos.liveliness().kind = fdds::AUTOMATIC_LIVELINESS_QOS;
-    qos.liveliness().lease_duration = duration(flow.liveliness_lease);
-    qos.liveliness().announcement_period = duration(flow.liveliness_lease / 4);
-  }
 }
 
 WriterKey key_of(const frtps::InstanceHandle_t& handle) {
@@ -239,29 +234,25 @@ struct ReaderBase::Impl : fdds::DataReaderListener {
   fdds::Subscriber* subscriber = nullptr;
   fdds::DataReader* reader = nullptr;
   std::function<void(fdds::DataReader&)> on_data;
-  ReaderEvents events;
+  MatchHandler on_match;
 
   void on_data_available(fdds::DataReader* from) override {
     guarded([&] { on_data(*from); });
   }
   void on_subscription_matched(fdds::DataReader*, const fdds::SubscriptionMatchedStatus& status) override {
-    if (events.on_match) guarded([&] { events.on_match(status.current_count_change); });
-  }
-  void on_liveliness_changed(fdds::DataReader*, const eprosima::fastrtps::LivelinessChangedStatus& status) override {
-    if (!events.on_liveliness) return;
-    guarded([&] { events.on_liveliness(key_of(status.last_publication_handle), status.alive_count_change > 0); });
+    if (on_match) guarded([&] { on_match(status.current_count_change); });
   }
 };
 
 ReaderBase::ReaderBase(Participant& participant, const Topic& topic, fdds::TopicDataType* type,
-                       std::function<void(fdds::DataReader&)> on_data, ReaderEvents events)
+                       std::function<void(fdds::DataReader&)> on_data, MatchHandler on_match)
     : impl_(std::make_unique<Impl>()) {
   fdds::DataReaderQos qos;
   set_flow(topic.flow, qos);
   qos.reliable_reader_qos().times.heartbeatResponseDelay = duration(kAnswerDelay);
   impl_->subscriber = participant.impl().subscriber;
   impl_->on_data = std::move(on_data);
-  impl_->events = std::move(events);
+  impl_->on_match = std::move(on_match);
   fdds::Topic* entity = participant.impl().topic(topic.name, fdds::TypeSupport(type));
   impl_->reader = impl_->subscriber->create_datareader(entity, qos, impl_.get());
   if (impl_->reader == nullptr) throw std::runtime_error("cannot make a DDS reader of " + topic.name);

@@ -74,16 +74,11 @@ class Writer : public WriterBase {
   bool write(const T& sample) { return write_raw(&sample); }
 };
 
-struct ReaderEvents {
-  std::function<void(int change)> on_match = nullptr;  // writers found (+) or lost (-)
-  // A writer that was heard of has become silent, or is back. Only for flows with a liveliness lease.
-  std::function<void(const WriterKey& writer, bool alive)> on_liveliness = nullptr;
-};
-
 class ReaderBase {
  public:
+  using MatchHandler = std::function<void(int change)>;  // writers found (+) or lost (-)
   ReaderBase(Participant& participant, const Topic& topic, eprosima::fastdds::dds::TopicDataType* type,
-             std::function<void(eprosima::fastdds::dds::DataReader&)> on_data, ReaderEvents events);
+             std::function<void(eprosima::fastdds::dds::DataReader&)> on_data, MatchHandler on_match);
   ~ReaderBase();
   ReaderBase(const ReaderBase&) = delete;
   ReaderBase& operator=(const ReaderBase&) = delete;
@@ -102,7 +97,7 @@ template <class T>
 class Reader : public ReaderBase {
  public:
   using Handler = std::function<void(T&& sample, const WriterKey& writer)>;
-  Reader(Participant& participant, const Topic& topic, Handler handler, ReaderEvents events = {});
+  Reader(Participant& participant, const Topic& topic, Handler handler, MatchHandler on_match = nullptr);
 
  private:
   static void take_all(eprosima::fastdds::dds::DataReader& reader, const std::string& name, const Handler& handler);
@@ -116,11 +111,11 @@ Writer<T>::Writer(Participant& participant, const Topic& topic, MatchHandler on_
     : WriterBase(participant, topic, new WireType<T>(wire_name<T>()), std::move(on_match)) {}
 
 template <class T>
-Reader<T>::Reader(Participant& participant, const Topic& topic, Handler handler, ReaderEvents events)
+Reader<T>::Reader(Participant& participant, const Topic& topic, Handler handler, MatchHandler on_match)
     : ReaderBase(
           participant, topic, new WireType<T>(wire_name<T>()),
           [name = topic.name, handler = std::move(handler)](auto& reader) { take_all(reader, name, handler); },
-          std::move(events)) {}
+          std::move(on_match)) {}
 
 template <class T>
 void Reader<T>::take_all(eprosima::fastdds::dds::DataReader& reader, const std::string& name, const Handler& handler) {

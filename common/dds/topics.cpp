@@ -39,12 +39,7 @@ Topic admission_topic() { return {"soda/admission", newest(kManyWorlds)}; }
 
 Topic control_topic() { return {"soda/control", newest(1)}; }
 
-// The lease is what tells of a dead or stopped world, long before its participant's lease does.
-Topic status_topic() {
-  Topic topic{"soda/status", newest(kManyWorlds)};
-  topic.flow.liveliness_lease = Millis(1000);
-  return topic;
-}
+Topic status_topic() { return {"soda/status", newest(kManyWorlds)}; }
 
 // Two minutes of history at 20 samples a second for those who come late; afterwards the oldest acknowledged go.
 Topic digests_topic() { return {"soda/digests", all(2400, Millis(1000))}; }

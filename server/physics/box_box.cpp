@@ -13,8 +13,10 @@ constexpr double kFacePreference = 0.02;
 // Likewise: a corner on the edge of the other's face counts as on the face.
 constexpr double kClipTolerance = 0.004;
 constexpr double kParallelEdges = 1e-6;  // squared sine; such edges have no useful cross product
-// Squared cosine of 8 deg. Nearer than this to a face's normal, edges are left to the face: it has more points to offer.
-constexpr double kFaceLike = 0.98;
+// Squared cosine of 5 deg. Nearer than this to a face's normal, edges are left to the face: it has more points to offer.
+constexpr double kFaceLike = 0.992;
+
+constexpr double kCrossing = 0.01;  // m, by which edges that touch may miss each other
 
 struct Axis {
   int kind = 0;  // 0: face of a, 1: face of b, 2: edges
@@ -83,6 +85,33 @@ void face_points(const Vec3& half_ref, const Vec3& half_other, const Vec3& towar
   }
 }
 
+// Where edge i of a and edge j of b, of those that look at each other, cross. False where they miss each other.
+bool edge_point(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, const Vec3& t, const Mat3& turn, int i, int j,
+                double max_distance, std::vector<DetectedPoint>& out) {
+  const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+  Vec3 normal;
+  normal[i] = 0;
+  normal[i1] = -turn(i2, j);
+  normal[i2] = turn(i1, j);
+  normal /= std::sqrt(normal[i1] * normal[i1] + normal[i2] * normal[i2]);
+  if (normal.dot(t) < 0) normal = -normal;
+  Vec3 on_a, on_b = t;
+  for (int k = 0; k < 3; ++k) on_a[k] = k == i ? 0 : normal[k] > 0 ? half_a[k] : -half_a[k];
+  for (int k = 0; k < 3; ++k)
+    if (k != j) on_b += (normal.dot(turn.col(k)) > 0 ? -half_b[k] : half_b[k]) * turn.col(k);
+  // on_a + s e_i and on_b + r b_j are nearest where the difference is across both edges.
+  const double cosine = turn(i, j), scale = 1 / (1 - cosine * cosine);
+  const Vec3 gap = on_b - on_a;
+  const double along_i = gap[i], along_j = gap.dot(turn.col(j));
+  on_a[i] += std::clamp((along_i - cosine * along_j) * scale, -half_a[i], half_a[i]);
+  on_b += std::clamp((cosine * along_i - along_j) * scale, -half_b[j], half_b[j]) * turn.col(j);
+  const double distance = normal.dot(on_b - on_a);
+  const double beside = kCrossing + slack_beside(max_distance);
+  if ((on_b - on_a - distance * normal).squaredNorm() > beside * beside) return false;
+  out.push_back({at_a.position + at_a.rotation * on_a, at_a.position + at_a.rotation * on_b, at_a.rotation * normal, distance});
+  return true;
+}
+
 }  // namespace
 
 void box_box(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, const Placement& at_b, double max_distance,
@@ -96,17 +125,17 @@ void box_box(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, cons
 
   // Separating axes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996): the one along which the boxes are furthest
   // apart, or overlap least.
-  Axis best;
+  Axis face, edges;
   const Vec3 face_a = t.cwiseAbs() - half_a - size * half_b;
   for (int i = 0; i < 3; ++i) {
     if (face_a[i] > max_distance) return;
-    if (face_a[i] > best.separation + preference) best = {0, i, 0, face_a[i]};
+    if (face_a[i] > face.separation + preference) face = {0, i, 0, face_a[i]};
   }
   const Vec3 t_in_b = turn.transpose() * t;
   const Vec3 face_b = t_in_b.cwiseAbs() - half_b - size.transpose() * half_a;
   for (int j = 0; j < 3; ++j) {
     if (face_b[j] > max_distance) return;
-    if (face_b[j] > best.separation + preference) best = {1, j, 0, face_b[j]};
+    if (face_b[j] > face.separation + preference) face = {1, j, 0, face_b[j]};
   }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
@@ -121,39 +150,20 @@ void box_box(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, cons
                            half_b[j2] * size(i, j1);
       const double separation = (along - reach) / std::sqrt(squared_sine);
       if (separation > max_distance) return;
-      if (!face_like && separation > best.separation + preference) best = {2, i, j, separation};
+      if (!face_like && separation > edges.separation) edges = {2, i, j, separation};
     }
 
+  const std::size_t before = out.size();
+  const bool edges_first = edges.separation > face.separation + preference;
+  if (edges_first && edge_point(half_a, at_a, half_b, t, turn, edges.i, edges.j, max_distance, out)) return;
   const double tolerance = kClipTolerance * smallest;
-  if (best.kind == 0) {
-    face_points(half_a, half_b, t, turn, best.i, at_a, false, tolerance, max_distance, out);
-  } else if (best.kind == 1) {
-    face_points(half_b, half_a, -t_in_b, turn.transpose(), best.i, at_b, true, tolerance, max_distance, out);
-  } else {
-    // The two edges that look at each other, and where they cross.
-    const int i = best.i, j = best.j, i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-    Vec3 normal;
-    normal[i] = 0;
-    normal[i1] = -turn(i2, j);
-    normal[i2] = turn(i1, j);
-    normal /= std::sqrt(normal[i1] * normal[i1] + normal[i2] * normal[i2]);
-    if (normal.dot(t) < 0) normal = -normal;
-    Vec3 on_a, on_b = t;
-    for (int k = 0; k < 3; ++k) on_a[k] = k == i ? 0 : normal[k] > 0 ? half_a[k] : -half_a[k];
-    for (int k = 0; k < 3; ++k)
-      if (k != j) on_b += (normal.dot(turn.col(k)) > 0 ? -half_b[k] : half_b[k]) * turn.col(k);
-    // on_a + s e_i and on_b + r b_j are nearest where both differences are across both edges.
-    const double cosine = turn(i, j), scale = 1 / (1 - cosine * cosine);
-    const Vec3 gap = on_b - on_a;
-    const double along_i = gap[i], along_j = gap.dot(turn.col(j));
-    const double s = std::clamp((along_i - cosine * along_j) * scale, -half_a[i], half_a[i]);
-    const double r = std::clamp((cosine * along_i - along_j) * scale, -half_b[j], half_b[j]);
-    on_a[i] += s;
-    on_b += r * turn.col(j);
-    const Vec3 world_normal = at_a.rotation * normal;
-    out.push_back({at_a.position + at_a.rotation * on_a, at_a.position + at_a.rotation * on_b, world_normal,
-                   normal.dot(on_b - on_a)});
-  }
+  if (face.kind == 0)
+    face_points(half_a, half_b, t, turn, face.i, at_a, false, tolerance, max_distance, out);
+  else
+    face_points(half_b, half_a, -t_in_b, turn.transpose(), face.i, at_b, true, tolerance, max_distance, out);
+  // The face preferred to nearly touching edges may have nothing in front of it.
+  if (out.size() == before && !edges_first && edges.kind == 2)
+    edge_point(half_a, at_a, half_b, t, turn, edges.i, edges.j, max_distance, out);
 }
 
 }  // namespace soda::physics

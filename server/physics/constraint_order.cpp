@@ -24,7 +24,9 @@ constexpr std::uint32_t kColours = 64;  // the last one is shared by whatever fi
 
 std::uint64_t ConstraintOrder::block_of(const Vec3& a, const Vec3& b) const {
   for (int grid = 0; grid < kBlockGrids; ++grid) {
-    const double shift = static_cast<double>(grid) / kBlockGrids;
+    // Scenes like round coordinates: no block ends at the origin, where bodies would change sides by rounding alone.
+    constexpr double kOffOrigin = 0.0947;
+    const double shift = static_cast<double>(grid) / kBlockGrids + kOffOrigin;
     std::uint64_t packed = static_cast<std::uint64_t>(grid);
     bool same = true;
     for (int axis = 2; axis >= 0; --axis) {

@@ -46,9 +46,9 @@ double nearest_point(const ContactRecord& record, const Party& a, const Party& b
   return nearest;
 }
 
-bool keeps_anchors(ShapeKind kind) {
-  // A round body rolls away from its anchors; only faces keep theirs.
-  return kind != ShapeKind::kSphere && kind != ShapeKind::kCapsule && kind != ShapeKind::kCylinder;
+// A round body rolls away from its anchors; only faces keep theirs, and a cylinder's cap is one.
+bool keeps_anchors(ShapeKind kind, std::uint32_t points) {
+  return kind != ShapeKind::kSphere && kind != ShapeKind::kCapsule && (kind != ShapeKind::kCylinder || points >= 3);
 }
 
 Placement place(const Party& body, const Child& child) {
@@ -140,7 +140,8 @@ void ContactUpdater::update(const Party& a, const Party& b, std::span<const Cont
       std::size_t end = first;
       while (end < previous.size() && (previous[end].part & ~kGroupMask) == pair) ++end;
       const auto old = previous.subspan(first, end - first);
-      if (!old.empty() && keeps_anchors(a.children[i].kind) && keeps_anchors(b.children[j].kind) &&
+      if (!old.empty() && keeps_anchors(a.children[i].kind, old[0].count) &&
+          keeps_anchors(b.children[j].kind, old[0].count) &&
           still_fit(old[0], a, b, limit, b.children[j].kind != ShapeKind::kConcave)) {
         double nearest = std::numeric_limits<double>::infinity();
         for (const ContactRecord& record : old) nearest = std::min(nearest, nearest_point(record, a, b));

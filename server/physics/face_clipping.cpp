@@ -1,17 +1,18 @@
 #include "server/physics/face_clipping.h"
 
-#include <BulletCollision/CollisionShapes/btConvexPolyhedron.h>
-#include <BulletCollision/CollisionShapes/btPolyhedralConvexShape.h>
-
 #include <cmath>
+
+#include "server/physics/polytope.h"
 
 namespace soda::physics {
 namespace {
 
 constexpr double kClipTolerance = 0.004;  // of a face's size: a corner on its edge counts as on it
 constexpr double kUsableFace = 0.2;       // cosine; faces that look further away from the normal are seen from the side
+constexpr double kStraight = 0.9999;      // cosine; a face that looks along the normal
 constexpr double kSameFacing = 1e-6;      // of two faces that look along the normal as well, a's is clipped against
-constexpr double kParallelSine = 0.1;     // lines that cross at a larger angle touch in one point only
+constexpr double kParallelSine = 0.05;    // lines that cross at a larger angle touch in one point only
+constexpr double kLineCosine = 0.1;       // a capsule seen from nearer to its axis than that shows its end, else its side
 constexpr double kCapCosine = 0.7;        // a cylinder seen from closer to its axis shows its cap
 
 void box_face(const Child& child, const Placement& at, const Vec3& direction, Feature& f) {
@@ -28,21 +29,9 @@ void box_face(const Child& child, const Placement& at, const Vec3& direction, Fe
 }
 
 void hull_face(const Child& child, const Placement& at, const Vec3& direction, Feature& f) {
-  const btConvexPolyhedron& hull = *static_cast<const btPolyhedralConvexShape*>(child.shape)->getConvexPolyhedron();
-  const Vec3 local = at.rotation.transpose() * direction;
-  const auto normal_of = [&](int face) {
-    const btScalar* plane = hull.m_faces[face].m_plane;
-    return Vec3(plane[0], plane[1], plane[2]);
-  };
-  int best = 0;
-  double best_cosine = -2;
-  for (int i = 0; i < hull.m_faces.size(); ++i)
-    if (const double cosine = normal_of(i).dot(local); cosine > best_cosine + kSameFacing) best = i, best_cosine = cosine;
-  f.normal = at.rotation * normal_of(best);
-  for (int i = 0; i < hull.m_faces[best].m_indices.size(); ++i) {
-    const btVector3& v = hull.m_vertices[hull.m_faces[best].m_indices[i]];
-    f.points.push_back(at.position + at.rotation * Vec3(v.x(), v.y(), v.z()));
-  }
+  face_along(*child.polytope, at.rotation.transpose() * direction, f);
+  f.normal = at.rotation * f.normal;
+  for (Vec3& p : f.points) p = at.position + at.rotation * p;
 }
 
 void cylinder_feature(const Child& child, const Placement& at, const Vec3& direction, Feature& f) {
@@ -99,14 +88,38 @@ void feature_along(const Child& child, const Placement& at, const Vec3& directio
     case ShapeKind::kBox: box_face(child, at, direction, f); break;
     case ShapeKind::kHull: hull_face(child, at, direction, f); break;
     case ShapeKind::kCapsule: {
-      const Vec3 half = child.half_length * at.rotation.col(2), low = at.position + child.radius * direction;
-      f.points = {low + half, low - half};
+      const Vec3 axis = at.rotation.col(2), low = at.position + child.radius * direction;
+      const double cosine = axis.dot(direction);
+      if (std::abs(cosine) < kLineCosine)
+        f.points = {low + child.half_length * axis, low - child.half_length * axis};
+      else
+        f.points = {low + (cosine > 0 ? child.half_length : -child.half_length) * axis};
       break;
     }
     case ShapeKind::kCylinder: cylinder_feature(child, at, direction, f); break;
     case ShapeKind::kPlane:
     case ShapeKind::kConcave: break;
   }
+}
+
+double reach_along(const Child& child, const Placement& at, const Vec3& direction) {
+  const Vec3 local = at.rotation.transpose() * direction;
+  const double middle = at.position.dot(direction);
+  switch (child.kind) {
+    case ShapeKind::kSphere: return middle + child.radius;
+    case ShapeKind::kBox: return middle + local.cwiseAbs().dot(child.box_half);
+    case ShapeKind::kCapsule: return middle + child.radius + child.half_length * std::abs(local.z());
+    case ShapeKind::kCylinder:
+      return middle + child.radius * local.head<2>().norm() + child.half_length * std::abs(local.z());
+    case ShapeKind::kHull: {
+      double most = -HUGE_VAL;
+      for (const Vec3& v : child.polytope->vertices) most = std::max(most, local.dot(v));
+      return middle + most;
+    }
+    case ShapeKind::kPlane:
+    case ShapeKind::kConcave: break;
+  }
+  return HUGE_VAL;
 }
 
 void FaceClipper::clip(const Feature& a, const Feature& b, const Vec3& normal, double max_distance,
@@ -128,11 +141,15 @@ void FaceClipper::onto_face(const Feature& face, const Feature& other, const Vec
   // Sutherland and Hodgman, "Reentrant polygon clipping", 1974, by the prism over the face along the normal.
   ring_ = other.points;
   const std::size_t corners = face.points.size();
-  double size = 0;
-  for (const Vec3& p : face.points) size = std::max(size, (p - face.points[0]).squaredNorm());
-  const double beside = kClipTolerance * std::sqrt(size) + slack_beside(max_distance);
   Vec3 middle = Vec3::Zero();
   for (const Vec3& p : face.points) middle += p / static_cast<double>(corners);
+  // Beside a face that is tilted against the normal its plane sticks out of the body: no slack there.
+  double beside = 0;
+  if (std::abs(face.normal.dot(normal)) > kStraight) {
+    double size = 0;
+    for (const Vec3& p : face.points) size = std::max(size, (p - face.points[0]).squaredNorm());
+    beside = kClipTolerance * std::sqrt(size) + slack_beside(max_distance);
+  }
   for (std::size_t e = 0; e < corners && !ring_.empty(); ++e) {
     const Vec3& from = face.points[e];
     const Vec3 edge = face.points[e + 1 < corners ? e + 1 : 0] - from;

@@ -20,6 +20,9 @@ struct Feature {
 // cylinder's cap as an octagon or its side's line. Its points are on the true surface.
 void feature_along(const Child& child, const Placement& at, const Vec3& direction, Feature& feature);
 
+// How far a convex shape reaches along `direction` (unit), m from the origin.
+double reach_along(const Child& child, const Placement& at, const Vec3& direction);
+
 class FaceClipper {
  public:
   // Appends points of the two features closer than `max_distance` along `normal` (unit, from a to b).

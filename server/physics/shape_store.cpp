@@ -10,6 +10,7 @@
 #include <limits>
 #include <unordered_map>
 
+#include "server/physics/polytope.h"
 #include "server/physics/triangle_surface.h"
 
 namespace soda::physics {
@@ -25,6 +26,7 @@ btVector3 to_bullet(const Vec3& v) { return btVector3(v.x(), v.y(), v.z()); }
 struct ShapeStore::Owned {
   std::unordered_map<std::uint32_t, Child> prepared;  // by index of the geometry; with neither pose
   std::vector<std::unique_ptr<btConvexShape>> shapes;
+  std::vector<std::unique_ptr<Polytope>> polytopes;
   std::vector<std::unique_ptr<TriangleSurface>> surfaces;
 
   template <typename T, typename... Args>
@@ -39,7 +41,6 @@ struct ShapeStore::Owned {
 ShapeStore::ShapeStore() : owned_(std::make_unique<Owned>()) {}
 ShapeStore::~ShapeStore() = default;
 
-// Margins are 0 wherever Bullet allows: the shapes are exactly what the scene says, not rounded and not blown up.
 void ShapeStore::prepare(const Geometry& geometry, Child& child) {
   struct Visitor {
     Owned& own;
@@ -58,6 +59,10 @@ void ShapeStore::prepare(const Geometry& geometry, Child& child) {
       child.surface = made.get();
       own.surfaces.push_back(std::move(made));
     }
+    void polytope(Polytope made) const {
+      own.polytopes.push_back(std::make_unique<Polytope>(std::move(made)));
+      child.polytope = own.polytopes.back().get();
+    }
     void operator()(const Sphere& s) const {
       child.kind = ShapeKind::kSphere;
       child.radius = s.radius;
@@ -69,6 +74,7 @@ void ShapeStore::prepare(const Geometry& geometry, Child& child) {
       auto* s = own.make<btBoxShape>(to_bullet(0.5 * b.size));
       s->setMargin(0);
       child.shape = s;
+      polytope(box_polytope(0.5 * b.size));
       box(0.5 * b.size);
     }
     void operator()(const Plane&) const {
@@ -87,7 +93,9 @@ void ShapeStore::prepare(const Geometry& geometry, Child& child) {
       child.radius = c.radius;
       child.half_length = 0.5 * c.length;
       auto* s = own.make<btCylinderShapeZ>(btVector3(c.radius, c.radius, 0.5 * c.length));
-      s->setMargin(0);
+      // GJK sees a cylinder with rounded rims: a thinner one and a distance round it, so that touching is not overlapping.
+      // Contact points are on the true one (face_clipping.h).
+      s->setMargin(0.1 * std::min(c.radius, 0.5 * c.length));
       child.shape = s;
       box(Vec3(c.radius, c.radius, 0.5 * c.length));
     }
@@ -97,8 +105,8 @@ void ShapeStore::prepare(const Geometry& geometry, Child& child) {
       for (const Vec3& p : h.points) s->addPoint(to_bullet(p), false);
       s->setMargin(0);
       s->recalcLocalAabb();
-      s->initializePolyhedralFeatures();
       child.shape = s;
+      polytope(hull_polytope(h.points));
       points(h.points);
     }
     void operator()(const TriangleMesh& m) const { surface(std::make_unique<TriangleSurface>(m)); }

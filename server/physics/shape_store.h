@@ -13,6 +13,7 @@ class btConvexShape;
 namespace soda::physics {
 
 class TriangleSurface;
+struct Polytope;
 
 enum class ShapeKind : std::uint8_t {
   kSphere,
@@ -34,8 +35,9 @@ struct Child {
   double radius = 0;                 // m; of a sphere, capsule, cylinder
   double half_length = 0;            // m; of a capsule's or cylinder's cylindrical part
   double inner_extent = 0;           // m, smallest half extent
-  const btConvexShape* shape = nullptr;          // for GJK; null where not convex
-  const TriangleSurface* surface = nullptr;      // where concave
+  const btConvexShape* shape = nullptr;      // for GJK; null where not convex
+  const Polytope* polytope = nullptr;        // of boxes and hulls
+  const TriangleSurface* surface = nullptr;  // where concave
 };
 
 class ShapeStore {

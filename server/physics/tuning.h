@@ -28,7 +28,8 @@ constexpr double kPushOutSpeed = 3;           // m/s, limit for removing penetra
 constexpr double kRestitutionThreshold = 1;   // m/s; slower approaches do not bounce
 
 // ---- integration
-constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning of anisotropic bodies is treated as free of torque terms
+constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning of anisotropic bodies is taken as free of torque terms
+constexpr int kMidpointIterations = 4;     // each gains a factor of about (angle per sub-step x anisotropy)
 
 // ---- sleeping
 constexpr double kSleepSpeed = 0.05;  // m/s, of the centre of mass, and of the fastest point about it

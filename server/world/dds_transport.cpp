@@ -41,11 +41,10 @@ void DdsTransport::open(std::span<const WorldId> neighbours) {
     link.sample.to(id);
     link.writer = std::make_unique<dds::Writer<wire::Border>>(
         participant_, dds::border_topic(me_, id), [this, &link](int change) { readers_changed(link, change); });
-    dds::ReaderEvents events;
-    events.on_match = [this, &link](int change) { writers_changed(link, change); };
     link.reader = std::make_unique<dds::Reader<wire::Border>>(
         participant_, dds::border_topic(id, me_),
-        [this, &link](wire::Border&& sample, const dds::WriterKey&) { came(link, std::move(sample)); }, events);
+        [this, &link](wire::Border&& sample, const dds::WriterKey&) { came(link, std::move(sample)); },
+        [this, &link](int change) { writers_changed(link, change); });
   }
 }
 

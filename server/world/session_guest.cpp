@@ -18,11 +18,6 @@ constexpr std::chrono::seconds kLogEvery{5};
 
 SessionGuest::SessionGuest(dds::Participant& participant, const std::string& session, const wire::Join& claim)
     : name_(session), claim_(claim) {
-  dds::ReaderEvents events;
-  events.on_match = [this](int change) {
-    const std::lock_guard lock(mutex_);
-    hosts_ += change;
-  };
   session_ = std::make_unique<dds::Reader<wire::Session>>(
       participant, dds::session_topic(),
       [this](wire::Session&& sample, const dds::WriterKey&) {
@@ -33,7 +28,10 @@ SessionGuest::SessionGuest(dds::Participant& participant, const std::string& ses
           offer(sample.instance()).session = std::move(sample);
         changed_.notify_all();
       },
-      events);
+      [this](int change) {
+        const std::lock_guard lock(mutex_);
+        hosts_ += change;
+      });
   scene_ = std::make_unique<dds::Reader<wire::SceneChunk>>(
       participant, dds::scene_topic(), [this](wire::SceneChunk&& sample, const dds::WriterKey&) {
         const std::lock_guard lock(mutex_);
@@ -94,11 +92,11 @@ std::optional<SessionGuest::Admitted> SessionGuest::ready() const {
       throw Refused("the scene that session '" + name_ + "' hands out is not the one that it describes");
     return admitted;
   }
-  if (offers_.empty() && other_protocol_ != 0) {
-    tell_claim();
+  const bool none_of_mine =
+      std::none_of(offers_.begin(), offers_.end(), [](const auto& entry) { return entry.second.session.has_value(); });
+  if (none_of_mine && other_protocol_ != 0)
     throw Refused("session '" + name_ + "' speaks protocol version " + std::to_string(other_protocol_) +
                   " and this daemon version " + std::to_string(claim_.protocol()) + ": use the same build everywhere");
-  }
   return std::nullopt;
 }
 
@@ -123,10 +121,16 @@ std::optional<SessionGuest::Admitted> SessionGuest::join(const std::function<boo
   auto next_log = std::chrono::steady_clock::now() + std::chrono::seconds(1);
   std::unique_lock lock(mutex_);
   while (!stop()) {
-    if (auto admitted = ready()) {
-      instance_ = admitted->session.instance();
-      for (auto& [instance, offer] : offers_) offer.chunks.clear();  // a large scene need not be held twice
-      return admitted;
+    try {
+      if (auto admitted = ready()) {
+        instance_ = admitted->session.instance();
+        for (auto& [instance, offer] : offers_) offer.chunks.clear();  // a large scene need not be held twice
+        return admitted;
+      }
+    } catch (const Refused&) {
+      lock.unlock();  // the handlers need it, and DDS must go on for the claim to arrive
+      tell_claim();
+      throw;
     }
     if (std::chrono::steady_clock::now() >= next_log) {
       log_waiting();

@@ -46,23 +46,9 @@ SessionHost::SessionHost(dds::Participant& participant, const wire::Session& ses
       participant, dds::session_topic(), [this](wire::Session&& other, const dds::WriterKey& writer) { heard(other, writer); });
   join_reader_ = std::make_unique<dds::Reader<wire::Join>>(
       participant, dds::join_topic(), [this](wire::Join&& claim, const dds::WriterKey&) { heard(claim); });
-  dds::ReaderEvents events;
-  events.on_liveliness = [this](const dds::WriterKey& writer, bool alive) {
-    const std::lock_guard lock(mutex_);
-    const auto known = status_writers_.find(writer);
-    spdlog::info("DEBUG liveliness alive={} known={}", alive, known != status_writers_.end());
-    if (!alive && known != status_writers_.end()) service_->silent(known->second);
-  };
   status_reader_ = std::make_unique<dds::Reader<wire::Status>>(
       participant, dds::status_topic(),
-      [this](wire::Status&& status, const dds::WriterKey& writer) {
-        {
-          const std::lock_guard lock(mutex_);
-          status_writers_[writer] = status.world();
-        }
-        service_->status(status);
-      },
-      events);
+      [this](wire::Status&& status, const dds::WriterKey&) { service_->status(status); });
   if (!session_writer_.write(session_)) throw std::runtime_error("cannot describe the session");
 }
 

@@ -1,9 +1,7 @@
 // The session service on the network: world 0's side.
 #pragma once
 
-#include <array>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -34,7 +32,6 @@ class SessionHost {
   const std::function<void(const wire::Control&)> on_control_;
   mutable std::mutex mutex_;
   std::string conflict_;
-  std::map<dds::WriterKey, WorldId> status_writers_;
   dds::Writer<wire::Session> session_writer_;
   dds::Writer<wire::SceneChunk> scene_writer_;
   dds::Writer<wire::Admission> admission_writer_;

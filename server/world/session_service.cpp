@@ -6,13 +6,14 @@
 #include <chrono>
 #include <utility>
 
-#include "common/version.h"
+#include "common/dds/topics.h"
 
 namespace soda::world {
 namespace {
 
 constexpr std::chrono::milliseconds kTick{10};  // of a paced run: finer than a frame of any display
 constexpr double kLogEvery = 5;                 // s, while worlds are missing
+constexpr double kSilenceSeconds = std::chrono::duration<double>(dds::kSilence).count();
 
 double seconds_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -58,7 +59,8 @@ std::string SessionService::join(const wire::Join& claim) {
            std::to_string(seats_.size() - 1);
   Seat& seat = seats_[claim.world()];
   if (seat.nonce == claim.nonce()) return "";  // told again
-  if (seat.nonce != 0 && !(seat.silent && phase_ == wire::PHASE_GATHERING))
+  const bool silent = seat.heard > 0 && seconds_now() - seat.heard > kSilenceSeconds;
+  if (seat.nonce != 0 && !(silent && phase_ == wire::PHASE_GATHERING))
     return "world " + std::to_string(claim.world()) + " is taken already (by " + seat.holder + ")";
   seat = Seat{};
   seat.nonce = claim.nonce();
@@ -74,17 +76,12 @@ void SessionService::status(const wire::Status& status) {
     if (status.instance() != session_.instance() || status.world() >= seats_.size()) return;
     Seat& seat = seats_[status.world()];
     if (seat.nonce == 0) return;
-    seat.silent = false;
+    seat.heard = seconds_now();
     seat.state = std::max(seat.state, status.state());
     seat.final_step = std::max<Step>(seat.final_step, status.final_step());
     news_ = true;
   }
   changed_.notify_one();
-}
-
-void SessionService::silent(WorldId world) {
-  const std::lock_guard lock(mutex_);
-  if (world < seats_.size()) seats_[world].silent = true;
 }
 
 bool SessionService::ended() const {

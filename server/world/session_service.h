@@ -25,11 +25,10 @@ class SessionService {
   SessionService(const SessionService&) = delete;
   SessionService& operator=(const SessionService&) = delete;
 
-  // From any thread. Why the claim is refused, or "".
+  // From any thread. Why the claim is refused, or "". Before the start, the seat of a daemon that has fallen silent is free
+  // for another.
   std::string join(const wire::Join& claim);
   void status(const wire::Status& status);
-  // World `world` was not heard of for a while. Before the start its seat becomes free for another daemon.
-  void silent(WorldId world);
 
   bool ended() const;
 
@@ -37,7 +36,7 @@ class SessionService {
   struct Seat {
     std::uint64_t nonce = 0;  // of the daemon that holds it; 0: free
     std::string holder;       // "host, process pid", for messages
-    bool silent = false;
+    double heard = 0;         // s, time of the last Status; 0: none yet
     std::uint8_t state = wire::STATE_PREPARING;
     Step final_step = 0;
   };

@@ -28,9 +28,12 @@ std::string SessionTest::new_session() {
   return "test-" + std::to_string(getpid()) + "-" + std::to_string(device());
 }
 
-std::string SessionTest::scene(const std::string& generator, std::uint32_t bodies, std::uint64_t seed) const {
+std::string SessionTest::scene(const std::string& generator, std::uint32_t bodies, double cell) const {
   const std::string file = path(generator + ".scene");
-  if (!std::filesystem::exists(file)) save_scene(generate(generator, bodies, seed), file);
+  if (std::filesystem::exists(file)) return file;
+  Scene scene = generate(generator, bodies, 1);
+  scene.territory_cell = cell;
+  save_scene(scene, file);
   return file;
 }
 

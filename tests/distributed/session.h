@@ -25,8 +25,8 @@ class SessionTest : public ::testing::Test {
   const std::filesystem::path& directory() const { return directory_; }
   // A name that no other session has.
   static std::string new_session();
-  // The file of a generated scene.
-  std::string scene(const std::string& generator, std::uint32_t bodies, std::uint64_t seed = 1) const;
+  // The file of a generated scene. `cell`: edge of a territory cell in m, 0: chosen by the program.
+  std::string scene(const std::string& generator, std::uint32_t bodies, double cell = 0) const;
 
   static std::vector<std::string> soda(const std::vector<std::string>& arguments);
   static std::vector<std::string> soda_world(const std::vector<std::string>& arguments);

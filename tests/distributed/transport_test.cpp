@@ -106,14 +106,16 @@ TEST_P(Transports, ANeighbourThatComesBackIsAnInterruption) {
   ASSERT_TRUE(got);
   EXPECT_EQ(got->kind, Incoming::Kind::kInterrupted);
   EXPECT_EQ(got->from, 1u);
-  // From here on it works again.
-  ASSERT_TRUE(meet(*a, *b));
+  // What is sent again after the last interruption arrives.
   a->transport.send(1, message(100, 2));
-  for (;;) {
-    const auto incoming = next(*b, 10s);
-    ASSERT_TRUE(incoming);
-    if (incoming->bytes == message(100, 2)) break;
+  bool arrived = false;
+  for (int i = 0; i < 500 && !arrived; ++i) {
+    while (const auto again = a->transport.receive())
+      if (again->kind == Incoming::Kind::kInterrupted) a->transport.send(1, message(100, 2));
+    const auto incoming = next(*b, 20ms);
+    arrived = incoming && incoming->bytes == message(100, 2);
   }
+  EXPECT_TRUE(arrived);
 }
 
 TEST_P(Transports, FlushWaitsForAcknowledgements) {

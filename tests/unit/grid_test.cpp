@@ -1,0 +1,137 @@
+// The territory grid and its division among worlds.
+#include "common/grid.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <set>
+
+#include "common/scene/generators.h"
+#include "common/scene/random.h"
+#include "common/territory.h"
+
+namespace soda {
+namespace {
+
+TEST(Grid, EveryPlaceHasOneCellAlsoOutsideAndWhereItIsNotANumber) {
+  Grid grid;
+  grid.origin = Vec3(-3, 2, 0);
+  grid.edge = 0.5;
+  grid.size = {4, 5, 6};
+  EXPECT_EQ(grid.cells(), 120u);
+  EXPECT_EQ(grid.cell_of(Vec3(-3, 2, 0)), (Cell{0, 0, 0}));
+  EXPECT_EQ(grid.cell_of(Vec3(-2.5, 2.49, 2.99)), (Cell{1, 0, 5}));
+  EXPECT_EQ(grid.cell_of(Vec3(1e12, -1e12, 1.2)), (Cell{3, 0, 2}));
+  const double inf = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(grid.cell_of(Vec3(inf, -inf, std::nan(""))), (Cell{3, 0, 0}));
+  EXPECT_EQ(grid.cell_of(Vec3(-0.0, 0.0, -0.0))[2], 0);
+  std::set<std::size_t> seen;
+  for (std::int32_t z = 0; z < 6; ++z)
+    for (std::int32_t y = 0; y < 5; ++y)
+      for (std::int32_t x = 0; x < 4; ++x) seen.insert(grid.index({x, y, z}));
+  EXPECT_EQ(seen.size(), grid.cells());
+  EXPECT_EQ(*seen.rbegin(), grid.cells() - 1);
+}
+
+TEST(Grid, HoldsTheSceneAndItsSpeeds) {
+  for (const char* name : {"piles", "heap", "city", "dominoes", "cluster"}) {
+    Scene scene = generate(name, 300, 1);
+    const Grid grid = make_grid(scene);
+    EXPECT_GE(grid.edge, scene.max_speed * scene.dt) << name;
+    EXPECT_GT(grid.cells(), 1u) << name;
+    EXPECT_LE(grid.cells(), kMaxCells) << name;
+    for (const Body& body : scene.bodies) {
+      if (body.is_static) continue;
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_GE(body.pose.position[axis], grid.origin[axis] - 1e-9) << name;
+        EXPECT_LE(body.pose.position[axis], grid.origin[axis] + grid.size[axis] * grid.edge + 1e-9) << name;
+      }
+    }
+    scene.territory_cell = 7.5;
+    EXPECT_EQ(make_grid(scene).edge, 7.5) << name;
+  }
+}
+
+TEST(Grid, GrowsItsCellsWhereBodiesAreSpreadWide) {
+  Scene scene = generate("piles", 54, 1);
+  scene.bodies[0].pose.position = Vec3(-1e6, 0, 0);
+  scene.bodies[1].pose.position = Vec3(0, 1e6, 1e6);
+  EXPECT_LE(make_grid(scene).cells(), kMaxCells);
+}
+
+TEST(Grid, TheLargestOrdinaryRadiusLeavesTheFewWideBodiesOut) {
+  EXPECT_EQ(largest_ordinary_radius({1, 1, 1, 2, 3.9, 50}), 3.9);
+  EXPECT_EQ(largest_ordinary_radius({1}), 1);
+  EXPECT_EQ(largest_ordinary_radius({5, 5, 5}), 5);
+}
+
+// Whether the cells of a world hang together over faces.
+bool connected(const TerritoryMap& map, WorldId world) {
+  const auto& size = map.grid.size;
+  std::vector<bool> seen(map.owner.size(), false);
+  std::queue<Cell> open;
+  std::size_t own = 0, reached = 0;
+  for (std::int32_t z = 0; z < size[2]; ++z)
+    for (std::int32_t y = 0; y < size[1]; ++y)
+      for (std::int32_t x = 0; x < size[0]; ++x)
+        if (map.owner[map.grid.index({x, y, z})] == world && own++ == 0) {
+          open.push({x, y, z});
+          seen[map.grid.index({x, y, z})] = true;
+        }
+  while (!open.empty()) {
+    const Cell c = open.front();
+    open.pop();
+    ++reached;
+    for (int axis = 0; axis < 3; ++axis)
+      for (int step : {-1, 1}) {
+        Cell n = c;
+        n[axis] += step;
+        if (n[axis] < 0 || n[axis] >= size[axis]) continue;
+        const std::size_t i = map.grid.index(n);
+        if (seen[i] || map.owner[i] != world) continue;
+        seen[i] = true;
+        open.push(n);
+      }
+  }
+  return own > 0 && reached == own;
+}
+
+TEST(Territories, AreConnectedBalancedAndComplete) {
+  const Scene scene = generate("piles", 64 * 27, 3);
+  const Grid grid = make_grid(scene);
+  for (const WorldId worlds : {1u, 2u, 3u, 4u, 7u, 8u, 16u}) {
+    const TerritoryMap map = bisect(scene, grid, worlds);
+    ASSERT_EQ(map.owner.size(), grid.cells());
+    std::vector<std::size_t> bodies(worlds, 0);
+    for (const WorldId owner : map.owner) ASSERT_LT(owner, worlds);
+    for (const Body& body : scene.bodies)
+      if (!body.is_static) ++bodies[map.owner_of(body.pose.position + body.pose.orientation * body.inertial.centre)];
+    for (WorldId w = 0; w < worlds; ++w) {
+      EXPECT_TRUE(connected(map, w)) << worlds << " worlds, world " << w;
+      EXPECT_GT(bodies[w], scene.bodies.size() / worlds / 2) << worlds << " worlds, world " << w;
+      EXPECT_LT(bodies[w], 2 * scene.bodies.size() / worlds + 1) << worlds << " worlds, world " << w;
+    }
+  }
+}
+
+TEST(Territories, AreAPureFunctionOfTheirArguments) {
+  const Scene scene = generate("city", 500, 4);
+  const Grid grid = make_grid(scene);
+  EXPECT_EQ(bisect(scene, grid, 5).owner, bisect(generate("city", 500, 4), make_grid(scene), 5).owner);
+}
+
+TEST(Territories, EveryWorldHasACellOrAnErrorIsThrown) {
+  Scene scene = generate("towers", 20, 1);  // few bodies, all at one side of a wide grid
+  scene.bodies[0].pose.position.x() += 60;
+  const Grid grid = make_grid(scene);
+  const TerritoryMap map = bisect(scene, grid, 12);
+  std::set<WorldId> owners(map.owner.begin(), map.owner.end());
+  EXPECT_EQ(owners.size(), 12u);
+  EXPECT_THROW(bisect(scene, grid, 0), std::invalid_argument);
+  EXPECT_THROW(bisect(scene, grid, static_cast<WorldId>(grid.cells() + 1)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace soda
