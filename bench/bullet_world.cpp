@@ -18,7 +18,9 @@ btTransform to_bullet(const Pose& p) {
 constexpr double kPlaneExtent = 1000;  // m, half edge of the box that stands for a plane, as in our own step
 
 struct MakeShape {
-  std::unique_ptr<btCollisionShape> operator()(const Sphere& s) const { return std::make_unique<btSphereShape>(s.radius); }
+  std::unique_ptr<btCollisionShape> operator()(const Sphere& s) const {
+    return std::make_unique<btSphereShape>(s.radius);
+  }
   std::unique_ptr<btCollisionShape> operator()(const Box& b) const {
     return std::make_unique<btBoxShape>(to_bullet(0.5 * b.size));
   }

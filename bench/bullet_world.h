@@ -1,5 +1,5 @@
-// A scene in stock Bullet, as its users would run it: btDiscreteDynamicsWorld in double precision with its default broad
-// phase, solver, iterations and settings; sleeping off. For comparison only.
+// A scene in stock Bullet, as its users would run it: btDiscreteDynamicsWorld in double precision with its default
+// broad phase, solver, iterations and settings; sleeping off. For comparison only.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@ class BulletWorld {
   explicit BulletWorld(const Scene& scene);
   ~BulletWorld();
 
-  void step();  // by the scene's dt
+  void step();                            // by the scene's dt
   Vec3 position(std::size_t body) const;  // m, centre of mass; by position among the scene's dynamic bodies
 
  private:

@@ -41,8 +41,8 @@ void plot(const Options& options, const std::string& name, const std::string& sc
   const std::string size = std::to_string(width) + "," + std::to_string(height);
   FILE* gnuplot = popen("gnuplot", "w");
   std::string all = "cd " + quoted(std::filesystem::absolute(options.out)) + "\nset datafile separator ','\n";
-  for (const auto& [terminal, ending] : {std::pair("svg background 'white' font 'sans,13'", "svg"),
-                                         std::pair("pngcairo font 'sans,11'", "png")})
+  for (const auto& [terminal, ending] :
+       {std::pair("svg background 'white' font 'sans,13'", "svg"), std::pair("pngcairo font 'sans,11'", "png")})
     all += "reset session\nset datafile separator ','\nset terminal " + std::string(terminal) + " size " + size +
            "\nset output '" + name + "." + ending + "'\n" + script + "\nunset output\n";
   const bool written = gnuplot && std::fputs(all.c_str(), gnuplot) >= 0;

@@ -46,7 +46,8 @@ class Csv {
 
 // Draws NAME.svg and NAME.png in the output directory with a gnuplot script (without terminal and output, relative to
 // that directory). Says so where gnuplot is missing; does nothing where there is no output directory.
-void plot(const Options& options, const std::string& name, const std::string& script, int width = 800, int height = 500);
+void plot(const Options& options, const std::string& name, const std::string& script, int width = 800,
+          int height = 500);
 
 double cpu_seconds();  // of this thread
 double median(std::vector<double> values);

@@ -1,6 +1,5 @@
 // soda-bench: what SODA costs and what it gains, measured.
 #include <CLI/CLI.hpp>
-
 #include <iostream>
 
 #include "bench/commands.h"

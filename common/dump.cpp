@@ -41,8 +41,7 @@ void put(std::ofstream& file, const T* values, std::size_t count) {
 
 template <class T>
 bool get(std::ifstream& file, T* values, std::size_t count) {
-  return static_cast<bool>(
-      file.read(reinterpret_cast<char*>(values), static_cast<std::streamsize>(count * sizeof(T))));
+  return static_cast<bool>(file.read(reinterpret_cast<char*>(values), static_cast<std::streamsize>(count * sizeof(T))));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Words in which a run is described on command lines, for `soda` and `soda-world` alike. All throw std::invalid_argument
-// with a message for people.
+// Words in which a run is described on command lines, for `soda` and `soda-world` alike. All throw
+// std::invalid_argument with a message for people.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace soda {
 
-constexpr Step kDefaultSteps = 600;   // 10 s at 60 Hz
-constexpr Step kDefaultWindow = 48;   // K: steps that a clock may be ahead of the displayed one, as in the paper
+constexpr Step kDefaultSteps = 600;  // 10 s at 60 Hz
+constexpr Step kDefaultWindow = 48;  // K: steps that a clock may be ahead of the displayed one, as in the paper
 
 // "realtime": 1; "max": 0 (as fast as possible); else a multiple of real time.
 double parse_pace(const std::string& text);

@@ -93,8 +93,8 @@ void Collector::take(const wire::Digests& digests) {
   Step& next = next_[digests.world()];
   if (digests.first() < next) return;  // told again
   if (digests.first() > next)
-    throw ReportError("the digests of world " + std::to_string(digests.world()) + " for steps " +
-                      std::to_string(next) + " to " + std::to_string(digests.first() - 1) + " were not heard");
+    throw ReportError("the digests of world " + std::to_string(digests.world()) + " for steps " + std::to_string(next) +
+                      " to " + std::to_string(digests.first() - 1) + " were not heard");
   for (std::size_t i = 0; i < digests.hashes().size(); ++i, ++next) {
     const auto at = static_cast<std::size_t>(next - next_whole_);
     if (at >= sums_.size()) sums_.resize(at + 1);

@@ -61,7 +61,7 @@ class Collector {
   Step whole_steps() const { return next_whole_; }  // digests of steps 0 .. whole_steps() - 1 are complete
   std::uint64_t bodies() const { return bodies_; }  // of the newest whole step
   std::optional<Clock::time_point> began() const { return began_; }  // the first world started
-  double wall_seconds() const;  // from then until the last news, of the run only
+  double wall_seconds() const;                                       // from then until the last news, of the run only
 
  private:
   struct Sum {

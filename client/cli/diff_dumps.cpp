@@ -76,7 +76,8 @@ std::string name_of(const BodyState& body) { return "body " + std::to_string(bod
 
 std::string name_of(const ContactRecord& record) {
   std::string name = "contact of body " + std::to_string(record.a) + " with ";
-  name += record.with_static() ? "static body " + std::to_string(record.b & ~kStaticBit) : "body " + std::to_string(record.b);
+  name += record.with_static() ? "static body " + std::to_string(record.b & ~kStaticBit)
+                               : "body " + std::to_string(record.b);
   return record.part == 0 ? name : name + ", part " + std::to_string(record.part);
 }
 

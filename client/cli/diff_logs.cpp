@@ -28,7 +28,8 @@ class Log {
     ++number_;
     Line line;
     int end = -1;
-    if (std::sscanf(text.c_str(), "%" SCNd64 " %" SCNu64 " %" SCNx64 "%n", &line.step, &line.bodies, &line.hash, &end) != 3 ||
+    if (std::sscanf(text.c_str(), "%" SCNd64 " %" SCNu64 " %" SCNx64 "%n", &line.step, &line.bodies, &line.hash,
+                    &end) != 3 ||
         static_cast<std::size_t>(end) != text.size())
       throw DiffError(path_.string() + ":" + std::to_string(number_) + ": not a line of a hash log (STEP BODIES HASH)");
     if (last_ && line.step != *last_ + 1)

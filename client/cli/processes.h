@@ -15,9 +15,9 @@ namespace soda::cli {
 
 struct Ended {
   std::string name;
-  int exit_code = 0;  // -1 if a signal ended it
-  int signal = 0;     // 0 if it exited
-  std::string reason;                // "exited with code 1", "was killed by signal 9 (Killed)"
+  int exit_code = 0;                   // -1 if a signal ended it
+  int signal = 0;                      // 0 if it exited
+  std::string reason;                  // "exited with code 1", "was killed by signal 9 (Killed)"
   std::deque<std::string> last_lines;  // of its log
 };
 
@@ -30,7 +30,8 @@ class Processes {
   Processes(const Processes&) = delete;
   Processes& operator=(const Processes&) = delete;
 
-  // Starts the program with `inherited` descriptors: {here, there}. It gets no terminal input. Throws std::system_error.
+  // Starts the program with `inherited` descriptors: {here, there}. It gets no terminal input. Throws
+  // std::system_error.
   void start(const std::string& name, const std::string& program, const std::vector<std::string>& arguments,
              const std::vector<std::pair<int, int>>& inherited);
   // Reads what was written and says who has ended since the last call. Does not block.

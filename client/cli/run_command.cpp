@@ -92,11 +92,13 @@ Scene load(const RunOptions& options) {
   std::vector<std::string> warnings;
   const bool terminal = isatty(STDERR_FILENO) == 1;
   const auto progress = [&](std::size_t done, std::size_t total) {
-    if (terminal && !options.follow.quiet) std::fprintf(stderr, "\r\x1b[2Kloading %s: %zu of %zu", options.scene.c_str(), done, total);
+    if (terminal && !options.follow.quiet)
+      std::fprintf(stderr, "\r\x1b[2Kloading %s: %zu of %zu", options.scene.c_str(), done, total);
     if (terminal && !options.follow.quiet && done == total) std::fputs("\r\x1b[2K", stderr);
   };
   Scene scene = load_any_scene(options.scene, progress, warnings);
-  for (const std::string& warning : warnings) std::fprintf(stderr, "warning: %s: %s\n", options.scene.c_str(), warning.c_str());
+  for (const std::string& warning : warnings)
+    std::fprintf(stderr, "warning: %s: %s\n", options.scene.c_str(), warning.c_str());
   return scene;
 }
 
@@ -104,7 +106,8 @@ Scene load(const RunOptions& options) {
 std::vector<WorldId> checked(RunOptions& o) {
   if (o.session.empty()) o.session = new_session_name();
   if (!dds::good_session_name(o.session))
-    throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" + o.session + "'");
+    throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" + o.session +
+                                "'");
   (void)parse_pace(o.pace);
   if (o.single()) {
     if (!o.start.empty()) throw std::invalid_argument("--start: there is only one world with --sync single");
@@ -122,7 +125,8 @@ std::vector<WorldId> checked(RunOptions& o) {
   start = parse_worlds(o.start);
   if (start.empty() || start.front() != 0)
     throw std::invalid_argument("--start: world 0 must be started here, because it has the scene");
-  if (start.back() >= o.worlds) throw std::invalid_argument("--start: there is no world " + std::to_string(start.back()));
+  if (start.back() >= o.worlds)
+    throw std::invalid_argument("--start: there is no world " + std::to_string(start.back()));
   return start;
 }
 
@@ -165,9 +169,8 @@ int run(RunOptions& options) {
   } else {
     source = std::make_unique<DdsSource>(options.network, options.session, !options.follow.files.dump.empty());
   }
-  Processes processes([&](const std::string& name, const std::string& line) {
-    show_line(table, name, line, options.follow.verbose);
-  });
+  Processes processes(
+      [&](const std::string& name, const std::string& line) { show_line(table, name, line, options.follow.verbose); });
   for (const WorldId world : start) {
     std::vector<std::pair<int, int>> inherited;
     if (world == 0) inherited.emplace_back(scene_fd->get(), kSceneFd);
@@ -189,17 +192,21 @@ void add_run_command(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("run", "simulate a scene on several worlds of this machine");
   command->add_option("scene", o->scene, "scene file (.scene, .txtpb, .sdf, .world)")->required();
   command->add_option("--session", o->session, "name of the session; a new one each time if not given");
-  command->add_option("--worlds", o->worlds, "how many worlds")->check(CLI::Range(1u, dds::kMaxWorlds))->capture_default_str();
+  command->add_option("--worlds", o->worlds, "how many worlds")
+      ->check(CLI::Range(1u, dds::kMaxWorlds))
+      ->capture_default_str();
   command->add_option("--steps", o->steps, "the run ends when this step is final everywhere")
       ->check(CLI::Range(Step{0}, dds::kMaxStepNumber))
       ->capture_default_str();
   command->add_option("--pace", o->pace, "'realtime', 'max' (as fast as possible), or a multiple of real time")
       ->capture_default_str();
-  command->add_option("--sync", o->sync,
-                      "'conservative', or 'single': one world in one process without network, the reference")
+  command
+      ->add_option("--sync", o->sync,
+                   "'conservative', or 'single': one world in one process without network, the reference")
       ->check(CLI::IsMember({"single", "conservative"}))
       ->capture_default_str();
-  command->add_option("--hash-log", o->follow.files.hash_log, "write 'STEP BODIES HASH' for each final step to this file");
+  command->add_option("--hash-log", o->follow.files.hash_log,
+                      "write 'STEP BODIES HASH' for each final step to this file");
   command->add_option("--stats", o->follow.stats, "write statistics to this file (JSON)");
   command->add_option("--dump", o->follow.files.dump, "write whole states to this file, for `soda diff`");
   command->add_option("--dump-steps", o->dump_steps, "A[:B]: the steps to dump; the last one if not given");

@@ -11,9 +11,9 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kPoll = 50ms;
-constexpr auto kEndAtMost = 15s;   // for daemons to end by themselves once the session is over
-constexpr auto kStopAtMost = 5s;   // for daemons to end when asked to
-constexpr auto kLastWords = 3s;    // for reports under way, once every daemon has ended
+constexpr auto kEndAtMost = 15s;  // for daemons to end by themselves once the session is over
+constexpr auto kStopAtMost = 5s;  // for daemons to end when asked to
+constexpr auto kLastWords = 3s;   // for reports under way, once every daemon has ended
 
 // Says how a daemon ended that should not have, with the end of its log.
 void say_ended(Table& table, const Ended& ended) {
@@ -110,7 +110,8 @@ void show_line(Table& table, const std::string& name, const std::string& line, b
   // The daemons put the letter of the level first. What has none did not come from the log, and is worth seeing.
   const bool logged = line.size() >= 2 && line[1] == ' ';
   const char level = logged ? line[0] : 'W';
-  if (verbose || (level != 'D' && level != 'I' && level != 'T')) table.say(name + ": " + (logged ? line.substr(2) : line));
+  if (verbose || (level != 'D' && level != 'I' && level != 'T'))
+    table.say(name + ": " + (logged ? line.substr(2) : line));
 }
 
 }  // namespace soda::cli

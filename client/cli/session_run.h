@@ -24,8 +24,8 @@ struct FollowOptions {
 };
 
 // Returns the command's exit code: 0, 1 if a daemon or the report failed, 2 if a daemon refused its scene or options,
-// 128 + number of the signal that ended it. All daemons of `processes` have ended when it returns; the files are written,
-// also of a run that did not come to its end.
+// 128 + number of the signal that ended it. All daemons of `processes` have ended when it returns; the files are
+// written, also of a run that did not come to its end.
 int follow(ReportSource& source, Processes& processes, Table& table, StopSignals& signals, Collector& collector,
            const FollowOptions& options);
 

@@ -41,10 +41,14 @@ std::string progress(const Collector& collector, Table::Clock::time_point now) {
 
 const char* state_name(std::uint8_t state) {
   switch (state) {
-    case wire::STATE_READY: return "ready";
-    case wire::STATE_RUNNING: return "running";
-    case wire::STATE_DONE: return "done";
-    default: return "preparing";
+    case wire::STATE_READY:
+      return "ready";
+    case wire::STATE_RUNNING:
+      return "running";
+    case wire::STATE_DONE:
+      return "done";
+    default:
+      return "preparing";
   }
 }
 
@@ -55,8 +59,7 @@ double Table::Speed::at(Clock::time_point now, Step final_now) {
     then = now;
     final_step = final_now;
   } else if (now - then >= kSpeedOver) {
-    steps_per_second =
-        static_cast<double>(final_now - final_step) / std::chrono::duration<double>(now - then).count();
+    steps_per_second = static_cast<double>(final_now - final_step) / std::chrono::duration<double>(now - then).count();
     then = now;
     final_step = final_now;
   }
@@ -76,8 +79,8 @@ void Table::update(const Collector& collector) {
 
 void Table::draw(const Collector& collector, Clock::time_point now) {
   std::vector<std::string> lines;
-  lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9}  {}", "world", "cells", "bodies", "clock",
-                              "final", "steps/s", "syncs", "waiting", "state"));
+  lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9}  {}", "world", "cells", "bodies",
+                              "clock", "final", "steps/s", "syncs", "waiting", "state"));
   const std::size_t room = std::max<std::size_t>(4, terminal_rows()) - 3;
   const auto& worlds = collector.worlds();
   for (std::size_t i = 0; i < worlds.size(); ++i) {
@@ -85,9 +88,7 @@ void Table::draw(const Collector& collector, Clock::time_point now) {
     const double speed = speeds_[i].at(now, s.final_step());
     if (lines.size() >= room && i + 1 < worlds.size()) continue;
     const auto heard = collector.heard(s.world());
-    const char* state = !heard                          ? "not here yet"
-                        : now - *heard > dds::kSilence ? "silent"
-                                                       : state_name(s.state());
+    const char* state = !heard ? "not here yet" : now - *heard > dds::kSilence ? "silent" : state_name(s.state());
     lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9.0f} {:>9} {:>8.2f}s  {}", s.world(), s.cells(),
                                 s.bodies(), s.clock(), s.final_step(), speed, s.syncs(), s.waiting_seconds(), state));
   }
@@ -137,14 +138,16 @@ void print_summary(const Collector& collector, bool complete) {
   }
   std::string text = fmt::format("{}: {} bodies, {} steps on {} {}: {:.2f} s simulated in {:.2f} s",
                                  session.scene_name().empty() ? to_hex(session.scene_hash()) : session.scene_name(),
-                                 collector.bodies(), steps, session.worlds(), session.worlds() == 1 ? "world" : "worlds",
-                                 simulated, wall);
-  if (wall > 0) text += fmt::format(" ({:.2f} x real time, {:.0f} steps/s)", simulated / wall, static_cast<double>(steps) / wall);
+                                 collector.bodies(), steps, session.worlds(),
+                                 session.worlds() == 1 ? "world" : "worlds", simulated, wall);
+  if (wall > 0)
+    text += fmt::format(" ({:.2f} x real time, {:.0f} steps/s)", simulated / wall, static_cast<double>(steps) / wall);
   if (!complete) text += fmt::format("\nended before step {}", session.last_step());
   text += fmt::format("\n{:.1f} s of CPU time", cpu);
   if (session.worlds() > 1)
-    text += fmt::format(", {:.1f} s waiting; {} synchronised steps, {} mixed islands, {} bodies changed worlds, {:.1f} MB sent",
-                        waiting, syncs, mixed, arrived, 1e-6 * static_cast<double>(bytes));
+    text += fmt::format(
+        ", {:.1f} s waiting; {} synchronised steps, {} mixed islands, {} bodies changed worlds, {:.1f} MB sent",
+        waiting, syncs, mixed, arrived, 1e-6 * static_cast<double>(bytes));
   if (interruptions > 0) text += fmt::format("\n{} interrupted connections were taken up again", interruptions);
   if (clamped > 0) text += fmt::format("\nwarning: bodies were slowed to the scene's largest speed {} times", clamped);
   if (held > 0) text += fmt::format("\nwarning: {} results were not finite and held back", held);

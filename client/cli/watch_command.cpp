@@ -36,7 +36,8 @@ void add_watch_command(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<WatchOptions>();
   CLI::App* command = app.add_subcommand("watch", "follow a session that was started by hand, to its end");
   command->add_option("--session", o->session, "name of the session")->capture_default_str();
-  command->add_option("--hash-log", o->follow.files.hash_log, "write 'STEP BODIES HASH' for each final step to this file");
+  command->add_option("--hash-log", o->follow.files.hash_log,
+                      "write 'STEP BODIES HASH' for each final step to this file");
   command->add_option("--stats", o->follow.stats, "write statistics to this file (JSON)");
   command->add_option("--dump", o->follow.files.dump, "write the whole states that world 0 dumps (its --dump-steps)");
   command->add_flag("--quiet,-q", o->follow.quiet, "no progress");

@@ -89,7 +89,7 @@ std::string decode(std::span<const std::byte> bytes, T& out) {
   return problem(out);
 }
 
-#define SODA_WIRE_TYPE(T)                                       \
+#define SODA_WIRE_TYPE(T)                                          \
   template std::vector<std::byte> encode<wire::T>(const wire::T&); \
   template std::string decode<wire::T>(std::span<const std::byte>, wire::T&);
 SODA_WIRE_TYPE(Session)

@@ -97,7 +97,8 @@ std::string problem(const wire::Session& s) {
   if (s.window() == 0 || s.window() > 100000) return "impossible window";
   if (!std::isfinite(s.dt()) || s.dt() <= 0) return "impossible dt";
   if (!ok_seconds(s.pace())) return "impossible pace";
-  if (s.dump_first() < -1 || s.dump_last() < s.dump_first() || s.dump_last() > kMaxStepNumber) return "impossible dump range";
+  if (s.dump_first() < -1 || s.dump_last() < s.dump_first() || s.dump_last() > kMaxStepNumber)
+    return "impossible dump range";
   return "";
 }
 
@@ -114,9 +115,7 @@ std::string problem(const wire::Join& s) {
   return "";
 }
 
-std::string problem(const wire::Admission& s) {
-  return ok_text(s.reason()) ? "" : "overlong text";
-}
+std::string problem(const wire::Admission& s) { return ok_text(s.reason()) ? "" : "overlong text"; }
 
 std::string problem(const wire::Control& s) {
   if (s.phase() > wire::PHASE_ENDED) return "unknown phase";

@@ -17,9 +17,9 @@
 namespace soda::dds {
 namespace {
 
-constexpr std::size_t kHeader = 8;                          // bytes
-constexpr std::size_t kMaxFrame = std::size_t{16} << 20;    // bytes; the largest report is a state chunk of 512 KiB
-constexpr std::size_t kReadSize = 64 * 1024;                // a pipe's capacity
+constexpr std::size_t kHeader = 8;                        // bytes
+constexpr std::size_t kMaxFrame = std::size_t{16} << 20;  // bytes; the largest report is a state chunk of 512 KiB
+constexpr std::size_t kReadSize = 64 * 1024;              // a pipe's capacity
 
 void write_all(int fd, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {

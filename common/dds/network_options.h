@@ -17,8 +17,8 @@ struct NetworkOptions {
   bool shared_memory = true;     // between processes of one machine
   std::string discovery_server;  // HOST:PORT of a fast-discovery-server with id 0; "": simple discovery
   std::uint32_t domain = 0;      // DDS domain
-  // s. A process that was silent for longer is taken for gone and must be discovered again. Well above the longest pause
-  // expected; a silent world is noticed faster, by its missing Status (kSilence in topics.h).
+  // s. A process that was silent for longer is taken for gone and must be discovered again. Well above the longest
+  // pause expected; a silent world is noticed faster, by its missing Status (kSilence in topics.h).
   double lease = 10;
 };
 

@@ -1,6 +1,11 @@
 #include "common/dds/participant.h"
 
 #include <arpa/inet.h>
+#include <fastdds/rtps/attributes/ServerAttributes.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <fastrtps/utils/IPFinder.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <spdlog/spdlog.h>
 
 #include <cmath>
@@ -14,11 +19,6 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <fastdds/rtps/attributes/ServerAttributes.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
-#include <fastrtps/utils/IPFinder.h>
-#include <fastrtps/utils/IPLocator.h>
 #include <mutex>
 #include <stdexcept>
 #include <utility>
@@ -36,7 +36,9 @@ constexpr std::uint32_t kShmSegment = 16u << 20;   // bytes; by default 512 KiB,
 constexpr std::uint32_t kSocketBuffer = 4u << 20;  // bytes
 constexpr double kAnnouncePeriod = 1;              // s, at most; how long two that lost each other take to meet again
 
-Duration_t duration(double seconds) { return {static_cast<std::int32_t>(seconds), static_cast<std::uint32_t>(std::fmod(seconds, 1) * 1e9)}; }
+Duration_t duration(double seconds) {
+  return {static_cast<std::int32_t>(seconds), static_cast<std::uint32_t>(std::fmod(seconds, 1) * 1e9)};
+}
 Duration_t duration(Millis ms) { return duration(static_cast<double>(ms.count()) * 1e-3); }
 
 // What Fast DDS has to say goes where our own messages go.
@@ -87,7 +89,8 @@ void set_discovery(const NetworkOptions& options, fdds::DomainParticipantQos& qo
   int port = 0;
   if (colon != std::string::npos) port = std::atoi(options.discovery_server.c_str() + colon + 1);
   const std::string host = options.discovery_server.substr(0, colon);
-  if (port <= 0 || port > 65535) throw std::invalid_argument("--discovery-server: not HOST:PORT: " + options.discovery_server);
+  if (port <= 0 || port > 65535)
+    throw std::invalid_argument("--discovery-server: not HOST:PORT: " + options.discovery_server);
   const auto [v4, v6] = frtps::IPLocator::resolveNameDNS(host);
   in_addr literal{};
   const bool is_address = inet_pton(AF_INET, host.c_str(), &literal) == 1;
@@ -104,8 +107,7 @@ void set_discovery(const NetworkOptions& options, fdds::DomainParticipantQos& qo
 // The same for the QoS of writers and of readers.
 template <class Qos>
 void set_flow(const Flow& flow, Qos& qos) {
-  qos.reliability().kind =
-      flow.reliable ? fdds::RELIABLE_RELIABILITY_QOS : fdds::BEST_EFFORT_RELIABILITY_QOS;
+  qos.reliability().kind = flow.reliable ? fdds::RELIABLE_RELIABILITY_QOS : fdds::BEST_EFFORT_RELIABILITY_QOS;
   qos.reliability().max_blocking_time = duration(flow.write_at_most);
   qos.durability().kind = flow.late_joiners ? fdds::TRANSIENT_LOCAL_DURABILITY_QOS : fdds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = flow.keep_last > 0 ? fdds::KEEP_LAST_HISTORY_QOS : fdds::KEEP_ALL_HISTORY_QOS;
@@ -183,7 +185,8 @@ Participant::Participant(const NetworkOptions& options, const std::string& sessi
 
 Participant::~Participant() = default;
 
-// ---- writers ----------------------------------------------------------------------------------------------------------
+// ---- writers
+// ----------------------------------------------------------------------------------------------------------
 
 struct WriterBase::Impl : fdds::DataWriterListener {
   fdds::Publisher* publisher = nullptr;
@@ -228,7 +231,8 @@ bool WriterBase::write_raw(const void* sample) {
   return impl_->writer->write(const_cast<void*>(sample));  // serialised, not changed
 }
 
-// ---- readers ----------------------------------------------------------------------------------------------------------
+// ---- readers
+// ----------------------------------------------------------------------------------------------------------
 
 struct ReaderBase::Impl : fdds::DataReaderListener {
   fdds::Subscriber* subscriber = nullptr;
@@ -271,9 +275,11 @@ bool ReaderBase::take_raw(fdds::DataReader& reader, void* received, WriterKey& w
   return true;
 }
 
-#define SODA_WIRE_NAME(T) \
-  template <>             \
-  const char* wire_name<wire::T>() { return "soda::wire::" #T; }
+#define SODA_WIRE_NAME(T)            \
+  template <>                        \
+  const char* wire_name<wire::T>() { \
+    return "soda::wire::" #T;        \
+  }
 SODA_WIRE_NAME(Session)
 SODA_WIRE_NAME(SceneChunk)
 SODA_WIRE_NAME(Join)

@@ -1,9 +1,9 @@
-// A process's membership in a session, and its typed writers and readers. RAII over Fast DDS; no Fast DDS type leaks out
-// but through types.h.
+// A process's membership in a session, and its typed writers and readers. RAII over Fast DDS; no Fast DDS type leaks
+// out but through types.h.
 //
-// Handlers run on threads of DDS, possibly before the constructor of the object that they serve has ended, one at a time
-// for each reader, and must be quick: a slow handler delays the other topics of its participant. After a Writer or Reader
-// is destroyed none of its handlers runs.
+// Handlers run on threads of DDS, possibly before the constructor of the object that they serve has ended, one at a
+// time for each reader, and must be quick: a slow handler delays the other topics of its participant. After a Writer or
+// Reader is destroyed none of its handlers runs.
 #pragma once
 
 #include <array>
@@ -28,7 +28,8 @@ namespace soda::dds {
 
 class Participant {
  public:
-  // Throws std::invalid_argument for options that make no sense, std::runtime_error when the network cannot be used so. `name` is for tools and logs.
+  // Throws std::invalid_argument for options that make no sense, std::runtime_error when the network cannot be used so.
+  // `name` is for tools and logs.
   Participant(const NetworkOptions& options, const std::string& session, const std::string& name);
   ~Participant();
   Participant(const Participant&) = delete;

@@ -29,9 +29,7 @@ Flow all(int max_samples, Millis write_at_most) {
 Topic session_topic() { return {"soda/session", newest(1)}; }
 
 // Holds the whole scene, for worlds that join late: as many chunks as the largest scene has.
-Topic scene_topic() {
-  return {"soda/scene", all(static_cast<int>(kMaxSceneBytes / kMaxChunkBytes) + 1, Millis(1000))};
-}
+Topic scene_topic() { return {"soda/scene", all(static_cast<int>(kMaxSceneBytes / kMaxChunkBytes) + 1, Millis(1000))}; }
 
 Topic join_topic() { return {"soda/join", newest(kManyWorlds)}; }
 
@@ -56,8 +54,8 @@ Topic transforms_topic() {
 }
 
 // The core keeps what was not acknowledged by the neighbour's core and sends it again when asked, so that this history
-// only has to hold what is under way. A write must not hold up the loop, which then treats the connection as interrupted.
-// TRANSIENT_LOCAL: VOLATILE writers of Fast DDS 2.9 drop a sample when a full history drains.
+// only has to hold what is under way. A write must not hold up the loop, which then treats the connection as
+// interrupted. TRANSIENT_LOCAL: VOLATILE writers of Fast DDS 2.9 drop a sample when a full history drains.
 Topic border_topic(WorldId from, WorldId to) {
   return {"soda/border/" + std::to_string(from) + "/" + std::to_string(to), all(64, Millis(10))};
 }

@@ -1,5 +1,5 @@
-// All topics of a session and how their samples flow: the one place where QoS is chosen. docs/topics.md is the table for
-// readers. A session is a partition named after it; all topics of this file live in it.
+// All topics of a session and how their samples flow: the one place where QoS is chosen. docs/topics.md is the table
+// for readers. A session is a partition named after it; all topics of this file live in it.
 #pragma once
 
 #include <chrono>
@@ -14,11 +14,11 @@ using Millis = std::chrono::milliseconds;
 
 struct Flow {
   bool reliable = true;
-  bool late_joiners = true;    // TRANSIENT_LOCAL: who comes later gets what the writer still has
-  int keep_last = 0;           // samples per instance; 0: all, up to max_samples
-  int max_samples = 0;         // in a writer's or reader's history, over all instances
+  bool late_joiners = true;  // TRANSIENT_LOCAL: who comes later gets what the writer still has
+  int keep_last = 0;         // samples per instance; 0: all, up to max_samples
+  int max_samples = 0;       // in a writer's or reader's history, over all instances
   int max_instances = 1;
-  Millis write_at_most{100};   // a write that cannot be done waits at most that long, then fails
+  Millis write_at_most{100};  // a write that cannot be done waits at most that long, then fails
 };
 
 struct Topic {
@@ -26,25 +26,25 @@ struct Topic {
   Flow flow;
 };
 
-Topic session_topic();      // Session
-Topic scene_topic();        // SceneChunk
-Topic join_topic();         // Join
-Topic admission_topic();    // Admission
-Topic control_topic();      // Control
-Topic status_topic();       // Status
-Topic digests_topic();      // Digests
-Topic states_topic();       // StateChunk
-Topic transforms_topic();   // Transforms
+Topic session_topic();                         // Session
+Topic scene_topic();                           // SceneChunk
+Topic join_topic();                            // Join
+Topic admission_topic();                       // Admission
+Topic control_topic();                         // Control
+Topic status_topic();                          // Status
+Topic digests_topic();                         // Digests
+Topic states_topic();                          // StateChunk
+Topic transforms_topic();                      // Transforms
 Topic border_topic(WorldId from, WorldId to);  // Border
 
-// Reliable writers tell readers what there is this often while it is not acknowledged. 3 s by default: a reader that lost
-// something would take that long to find out.
+// Reliable writers tell readers what there is this often while it is not acknowledged. 3 s by default: a reader that
+// lost something would take that long to find out.
 constexpr Millis kHeartbeat{50};
 // Answers to heartbeats and to requests for lost samples are not delayed further (5 ms by default).
 constexpr Millis kAnswerDelay{1};
 
-// A world of which no Status came for that long is called silent. (Not left to a DDS liveliness lease: measured with Fast
-// DDS 2.9, a reader with several writers is not told of the one that stopped while the others go on.)
+// A world of which no Status came for that long is called silent. (Not left to a DDS liveliness lease: measured with
+// Fast DDS 2.9, a reader with several writers is not told of the one that stopped while the others go on.)
 constexpr Millis kSilence{2000};
 
 }  // namespace soda::dds

@@ -1,15 +1,15 @@
-// Gives the wire types to Fast DDS. Taking apart never fails for DDS: a sample that is refused arrives as a Received with
-// the reason, because Fast DDS would leave it in the reader's history otherwise, and nothing but ours is to catch what a
-// malformed sample throws.
+// Gives the wire types to Fast DDS. Taking apart never fails for DDS: a sample that is refused arrives as a Received
+// with the reason, because Fast DDS would leave it in the reader's history otherwise, and nothing but ours is to catch
+// what a malformed sample throws.
 #pragma once
 
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
-#include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/rtps/common/InstanceHandle.h>
 #include <fastdds/rtps/common/SerializedPayload.h>
 
 #include <cstring>
+#include <fastdds/dds/topic/TopicDataType.hpp>
 #include <functional>
 #include <string>
 #include <type_traits>
@@ -61,9 +61,7 @@ class WireType final : public eprosima::fastdds::dds::TopicDataType {
   }
 
   std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
-    return [data] {
-      return static_cast<std::uint32_t>(T::getCdrSerializedSize(*static_cast<const T*>(data))) + 4;
-    };
+    return [data] { return static_cast<std::uint32_t>(T::getCdrSerializedSize(*static_cast<const T*>(data))) + 4; };
   }
 
   void* createData() override { return new Received<T>(); }

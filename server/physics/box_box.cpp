@@ -6,14 +6,15 @@
 namespace soda::physics {
 namespace {
 
-// Of the smaller box's smallest half extent. Faces that are nearly as good as each other, or an edge pair that is hardly
-// better than a face, must not take turns from step to step: the earlier candidate stays unless the later one is better
-// by this.
+// Of the smaller box's smallest half extent. Faces that are nearly as good as each other, or an edge pair that is
+// hardly better than a face, must not take turns from step to step: the earlier candidate stays unless the later one is
+// better by this.
 constexpr double kFacePreference = 0.02;
 // Likewise: a corner on the edge of the other's face counts as on the face.
 constexpr double kClipTolerance = 0.004;
 constexpr double kParallelEdges = 1e-6;  // squared sine; such edges have no useful cross product
-// Squared cosine of 5 deg. Nearer than this to a face's normal, edges are left to the face: it has more points to offer.
+// Squared cosine of 5 deg. Nearer than this to a face's normal, edges are left to the face: it has more points to
+// offer.
 constexpr double kFaceLike = 0.992;
 
 constexpr double kCrossing = 0.01;  // m, by which edges that touch may miss each other
@@ -28,7 +29,8 @@ struct Point2 {
   double u, v, depth;  // in the reference face; depth along its normal
 };
 
-// The part of a polygon on the side coordinate * sign <= limit; Sutherland and Hodgman, "Reentrant polygon clipping", 1974.
+// The part of a polygon on the side coordinate * sign <= limit; Sutherland and Hodgman, "Reentrant polygon clipping",
+// 1974.
 template <double Point2::*kCoordinate>
 int clip(const Point2* in, int count, double sign, double limit, Point2* out) {
   int kept = 0;
@@ -86,8 +88,8 @@ void face_points(const Vec3& half_ref, const Vec3& half_other, const Vec3& towar
 }
 
 // Where edge i of a and edge j of b, of those that look at each other, cross. False where they miss each other.
-bool edge_point(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, const Vec3& t, const Mat3& turn, int i, int j,
-                double max_distance, std::vector<DetectedPoint>& out) {
+bool edge_point(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, const Vec3& t, const Mat3& turn, int i,
+                int j, double max_distance, std::vector<DetectedPoint>& out) {
   const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
   Vec3 normal;
   normal[i] = 0;
@@ -108,7 +110,8 @@ bool edge_point(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, c
   const double distance = normal.dot(on_b - on_a);
   const double beside = kCrossing + slack_beside(max_distance);
   if ((on_b - on_a - distance * normal).squaredNorm() > beside * beside) return false;
-  out.push_back({at_a.position + at_a.rotation * on_a, at_a.position + at_a.rotation * on_b, at_a.rotation * normal, distance});
+  out.push_back(
+      {at_a.position + at_a.rotation * on_a, at_a.position + at_a.rotation * on_b, at_a.rotation * normal, distance});
   return true;
 }
 
@@ -117,7 +120,7 @@ bool edge_point(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, c
 void box_box(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, const Placement& at_b, double max_distance,
              std::vector<DetectedPoint>& out) {
   const Vec3 between = at_b.position - at_a.position;
-  const Vec3 t = at_a.rotation.transpose() * between;         // b's centre in a's frame
+  const Vec3 t = at_a.rotation.transpose() * between;           // b's centre in a's frame
   const Mat3 turn = at_a.rotation.transpose() * at_b.rotation;  // b's axes in a's frame
   const Mat3 size = turn.cwiseAbs();
   const double smallest = std::min(half_a.minCoeff(), half_b.minCoeff());
@@ -146,8 +149,8 @@ void box_box(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, cons
       const double steepest = std::max(std::max(size(i1, j), size(i2, j)), std::max(size(i, j1), size(i, j2)));
       const bool face_like = steepest * steepest > kFaceLike * squared_sine;
       const double along = std::abs(t[i2] * turn(i1, j) - t[i1] * turn(i2, j));
-      const double reach = half_a[i1] * size(i2, j) + half_a[i2] * size(i1, j) + half_b[j1] * size(i, j2) +
-                           half_b[j2] * size(i, j1);
+      const double reach =
+          half_a[i1] * size(i2, j) + half_a[i2] * size(i1, j) + half_b[j1] * size(i, j2) + half_b[j2] * size(i, j1);
       const double separation = (along - reach) / std::sqrt(squared_sine);
       if (separation > max_distance) return;
       if (!face_like && separation > edges.separation) edges = {2, i, j, separation};

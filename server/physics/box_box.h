@@ -8,8 +8,8 @@
 
 namespace soda::physics {
 
-// Boxes of half extents `half_a`, `half_b` (m) at the places given. Appends the points closer than `max_distance`: up to
-// 8 of a face contact, one where edges cross.
+// Boxes of half extents `half_a`, `half_b` (m) at the places given. Appends the points closer than `max_distance`: up
+// to 8 of a face contact, one where edges cross.
 void box_box(const Vec3& half_a, const Placement& at_a, const Vec3& half_b, const Placement& at_b, double max_distance,
              std::vector<DetectedPoint>& out);
 

@@ -14,8 +14,8 @@ void store(const Vec3& v, double* p) { p[0] = v.x(), p[1] = v.y(), p[2] = v.z();
 void store(const Quat& q, double* p) { p[0] = q.x(), p[1] = q.y(), p[2] = q.z(), p[3] = q.w(); }
 
 constexpr std::uint32_t kGroupMask = 0xff;
-constexpr double kSameNormal = 0.99;       // cosine; points whose normals agree this well share a record
-constexpr double kSamePointShare = 0.01;   // of the smaller half extent; nearer points are one
+constexpr double kSameNormal = 0.99;      // cosine; points whose normals agree this well share a record
+constexpr double kSamePointShare = 0.01;  // of the smaller half extent; nearer points are one
 
 // Squared sine of half the angle by which a body has turned since.
 double half_sine_squared(const double* then, const Quat& now) {
@@ -23,9 +23,9 @@ double half_sine_squared(const double* then, const Quat& now) {
   return std::max(0.0, 1 - dot * dot);
 }
 
-// Whether points found then still tell where the two touch. Three points and more are a whole face: that has to move away
-// or tilt visibly before others matter. One or two points, and those on a surface of triangles, tell nothing of the
-// corners further off, which may come down meanwhile: no corner may have moved so far.
+// Whether points found then still tell where the two touch. Three points and more are a whole face: that has to move
+// away or tilt visibly before others matter. One or two points, and those on a surface of triangles, tell nothing of
+// the corners further off, which may come down meanwhile: no corner may have moved so far.
 bool still_fit(const ContactRecord& record, const Party& a, const Party& b, double limit, bool whole_face) {
   const double moved = (b.position - a.position - vec(record.offset)).squaredNorm();
   const double turned_a = half_sine_squared(record.orientation_a, a.orientation);
@@ -38,11 +38,13 @@ bool still_fit(const ContactRecord& record, const Party& a, const Party& b, doub
 }
 
 double nearest_point(const ContactRecord& record, const Party& a, const Party& b) {
-  const Mat3 turn_a = turn_since(record.orientation_a, a.rotation), turn_b = turn_since(record.orientation_b, b.rotation);
+  const Mat3 turn_a = turn_since(record.orientation_a, a.rotation),
+             turn_b = turn_since(record.orientation_b, b.rotation);
   const Vec3 offset = b.position - a.position, n = vec(record.normal);
   double nearest = std::numeric_limits<double>::infinity();
   for (std::uint32_t k = 0; k < record.count; ++k)
-    nearest = std::min(nearest, n.dot(offset + turn_b * vec(record.points[k].arm_b) - turn_a * vec(record.points[k].arm_a)));
+    nearest =
+        std::min(nearest, n.dot(offset + turn_b * vec(record.points[k].arm_b) - turn_a * vec(record.points[k].arm_a)));
   return nearest;
 }
 
@@ -103,7 +105,8 @@ void match_impulses(ContactRecord& record, const Party& a, const Party& b, std::
     std::uint32_t best_point = 0;
     for (std::size_t r = 0; r < records; ++r) {
       const ContactRecord& from = previous[r];
-      const Mat3 turn_a = turn_since(from.orientation_a, a.rotation), turn_b = turn_since(from.orientation_b, b.rotation);
+      const Mat3 turn_a = turn_since(from.orientation_a, a.rotation),
+                 turn_b = turn_since(from.orientation_b, b.rotation);
       for (std::uint32_t k = 0; k < from.count; ++k) {
         if (used[r] & (1u << k)) continue;
         const double distance = lone ? 0

@@ -14,10 +14,10 @@ namespace soda::physics {
 
 // A body as a party to a contact.
 struct Party {
-  BodyId key;       // id, or kStaticBit | id
-  Vec3 position;    // m, centre of mass (static: origin)
+  BodyId key;     // id, or kStaticBit | id
+  Vec3 position;  // m, centre of mass (static: origin)
   Quat orientation;
-  Mat3 rotation;    // of orientation
+  Mat3 rotation;  // of orientation
   std::span<const Child> children;
   double inner_extent;  // m, smallest half extent of its children
   double radius;        // m, about the centre of mass; 0 of a static body, which does not turn
@@ -44,7 +44,9 @@ class ContactUpdater {
 
 // Which children a record is about: ContactRecord::part without the face group.
 constexpr std::uint32_t kMaxChildren = 1u << 12;  // per body
-constexpr std::uint32_t child_pair(std::uint32_t child_a, std::uint32_t child_b) { return child_a << 20 | child_b << 8; }
+constexpr std::uint32_t child_pair(std::uint32_t child_a, std::uint32_t child_b) {
+  return child_a << 20 | child_b << 8;
+}
 
 // How a body has turned since a record's points were detected.
 Mat3 turn_since(const double* orientation_then, const Mat3& rotation_now);

@@ -32,9 +32,9 @@ constexpr double kSeamCosine = 0.99;  // 8 deg
 // m; where clipping finds nothing as near as this above the nearest point, that point is used, too (edges that cross).
 constexpr double kMissed = 0.002;
 constexpr double kBetterAxis = 1e-3;  // m, by which another direction must be better than that found
-constexpr double kOnEdge = 1e-6;  // barycentric; a point this near to a triangle's edge is on it
-constexpr double kCrossing = 0.01;  // m, by which edges that touch may miss each other
-constexpr double kAlike = 1e-3;   // of a triangle's size; corners that reach equally far within this do
+constexpr double kOnEdge = 1e-6;      // barycentric; a point this near to a triangle's edge is on it
+constexpr double kCrossing = 0.01;    // m, by which edges that touch may miss each other
+constexpr double kAlike = 1e-3;       // of a triangle's size; corners that reach equally far within this do
 // Of the smaller shape's smallest half extent: see find_axes.
 constexpr double kFacePreference = 0.02;
 // Pairs of edges beyond which the test of all separating axes costs more than GJK.
@@ -92,8 +92,8 @@ unsigned edges_along(const Triangle& t, const Vec3& direction) {
   return edges;
 }
 
-// Whether a body on the side `front` (1 or -1) may touch one of those edges otherwise than with the triangle's own normal:
-// where it sticks out, or where the surface ends.
+// Whether a body on the side `front` (1 or -1) may touch one of those edges otherwise than with the triangle's own
+// normal: where it sticks out, or where the surface ends.
 bool sticks_out(const Triangle& t, unsigned edges, double front) {
   for (unsigned i = 0; i < 3; ++i)
     if ((edges & 1u << i) && (t.bend[i] == Bend::kOpen || t.bend[i] == (front > 0 ? Bend::kConvex : Bend::kConcave)))
@@ -105,7 +105,8 @@ bool sticks_out(const Triangle& t, unsigned edges, double front) {
 
 class Detector::Pair {
  public:
-  void spheres(const Child& a, const Child& b, const Placement& at_b, double max_distance, std::vector<DetectedPoint>& out) {
+  void spheres(const Child& a, const Child& b, const Placement& at_b, double max_distance,
+               std::vector<DetectedPoint>& out) {
     const double length = at_b.position.norm(), distance = length - a.radius - b.radius;
     if (distance > max_distance) return;
     const Vec3 n = length > 0 ? Vec3(at_b.position / length) : Vec3(Vec3::UnitZ());
@@ -264,7 +265,8 @@ class Detector::Pair {
     double height = up.dot(away);
     Vec3 normal = -up;
     if (height < kSeamCosine * length) {
-      if (length - a.radius > max_distance || !sticks_out(t, edges_at(t, on_b), front)) return;  // a neighbour has this contact
+      if (length - a.radius > max_distance || !sticks_out(t, edges_at(t, on_b), front))
+        return;  // a neighbour has this contact
       normal = away / -length;
       height = length;
     }
@@ -278,7 +280,8 @@ class Detector::Pair {
                       double max_distance, std::vector<DetectedPoint>& out) {
     btTriangleShape shape(to_bullet(t.corner[0]), to_bullet(t.corner[1]), to_bullet(t.corner[2]));
     shape.setMargin(0);
-    const std::optional<DetectedPoint> nearest = gjk(*a.shape, at_a, shape, {Vec3::Zero(), Mat3::Identity()}, max_distance);
+    const std::optional<DetectedPoint> nearest =
+        gjk(*a.shape, at_a, shape, {Vec3::Zero(), Mat3::Identity()}, max_distance);
     if (!nearest) return;
     feature_b_.points.assign(t.corner.begin(), t.corner.end());
     feature_b_.normal = up;
@@ -297,8 +300,8 @@ class Detector::Pair {
                  std::vector<DetectedPoint>& out) {
     place(*a.polytope, at_a, polytope_a_);
     place(*b.polytope, at_b, polytope_b_);
-    const SeparatingAxes axes = find_axes(polytope_a_, polytope_b_, max_distance,
-                                          kFacePreference * std::min(a.inner_extent, b.inner_extent));
+    const SeparatingAxes axes =
+        find_axes(polytope_a_, polytope_b_, max_distance, kFacePreference * std::min(a.inner_extent, b.inner_extent));
     touch(axes, max_distance, out);
     if (out.empty() && axes.best.separation < 0) by_gjk(a, at_a, b, at_b, max_distance, out);  // odd corners
   }

@@ -1,5 +1,5 @@
-// Narrow phase for one pair of child shapes. Its answer depends on the two shapes and their poses alone; nothing is kept
-// between calls, and nothing in it goes through the host's libm.
+// Narrow phase for one pair of child shapes. Its answer depends on the two shapes and their poses alone; nothing is
+// kept between calls, and nothing in it goes through the host's libm.
 #pragma once
 
 #include <memory>
@@ -14,9 +14,9 @@ class Detector {
  public:
   Detector();
   ~Detector();
-  // Points of a and b closer than `max_distance`, relative to a's place: of a pair of convex shapes up to a few more than
-  // kMaxContactPoints, on surfaces as many for each triangle. Call with the canonical order (lower id first, dynamic
-  // before static), for the answer for (b, a) has other bits. Replaces `out`.
+  // Points of a and b closer than `max_distance`, relative to a's place: of a pair of convex shapes up to a few more
+  // than kMaxContactPoints, on surfaces as many for each triangle. Call with the canonical order (lower id first,
+  // dynamic before static), for the answer for (b, a) has other bits. Replaces `out`.
   void detect(const Child& a, const Placement& at_a, const Child& b, const Placement& at_b, double max_distance,
               std::vector<DetectedPoint>& out);
 

@@ -12,8 +12,8 @@ constexpr double kUsableFace = 0.2;       // cosine; faces that look further awa
 constexpr double kStraight = 0.9999;      // cosine; a face that looks along the normal
 constexpr double kSameFacing = 1e-6;      // of two faces that look along the normal as well, a's is clipped against
 constexpr double kParallelSine = 0.05;    // lines that cross at a larger angle touch in one point only
-constexpr double kLineCosine = 0.1;       // a capsule seen from nearer to its axis than that shows its end, else its side
-constexpr double kCapCosine = 0.7;        // a cylinder seen from closer to its axis shows its cap
+constexpr double kLineCosine = 0.1;  // a capsule seen from nearer to its axis than that shows its end, else its side
+constexpr double kCapCosine = 0.7;   // a cylinder seen from closer to its axis shows its cap
 
 void box_face(const Child& child, const Placement& at, const Vec3& direction, Feature& f) {
   const Vec3 local = at.rotation.transpose() * direction;
@@ -25,7 +25,8 @@ void box_face(const Child& child, const Placement& at, const Vec3& direction, Fe
   f.normal = side * at.rotation.col(axis);
   const Vec3 centre = at.position + child.box_half[axis] * f.normal;
   const Vec3 along_p = child.box_half[p] * at.rotation.col(p), along_q = child.box_half[q] * at.rotation.col(q);
-  f.points = {centre + along_p + along_q, centre - along_p + along_q, centre - along_p - along_q, centre + along_p - along_q};
+  f.points = {centre + along_p + along_q, centre - along_p + along_q, centre - along_p - along_q,
+              centre + along_p - along_q};
 }
 
 void hull_face(const Child& child, const Placement& at, const Vec3& direction, Feature& f) {
@@ -84,9 +85,15 @@ void feature_along(const Child& child, const Placement& at, const Vec3& directio
   f.points.clear();
   f.normal = Vec3::Zero();
   switch (child.kind) {
-    case ShapeKind::kSphere: f.points = {at.position + child.radius * direction}; break;
-    case ShapeKind::kBox: box_face(child, at, direction, f); break;
-    case ShapeKind::kHull: hull_face(child, at, direction, f); break;
+    case ShapeKind::kSphere:
+      f.points = {at.position + child.radius * direction};
+      break;
+    case ShapeKind::kBox:
+      box_face(child, at, direction, f);
+      break;
+    case ShapeKind::kHull:
+      hull_face(child, at, direction, f);
+      break;
     case ShapeKind::kCapsule: {
       const Vec3 axis = at.rotation.col(2), low = at.position + child.radius * direction;
       const double cosine = axis.dot(direction);
@@ -96,9 +103,12 @@ void feature_along(const Child& child, const Placement& at, const Vec3& directio
         f.points = {low + (cosine > 0 ? child.half_length : -child.half_length) * axis};
       break;
     }
-    case ShapeKind::kCylinder: cylinder_feature(child, at, direction, f); break;
+    case ShapeKind::kCylinder:
+      cylinder_feature(child, at, direction, f);
+      break;
     case ShapeKind::kPlane:
-    case ShapeKind::kConcave: break;
+    case ShapeKind::kConcave:
+      break;
   }
 }
 
@@ -106,9 +116,12 @@ double reach_along(const Child& child, const Placement& at, const Vec3& directio
   const Vec3 local = at.rotation.transpose() * direction;
   const double middle = at.position.dot(direction);
   switch (child.kind) {
-    case ShapeKind::kSphere: return middle + child.radius;
-    case ShapeKind::kBox: return middle + local.cwiseAbs().dot(child.box_half);
-    case ShapeKind::kCapsule: return middle + child.radius + child.half_length * std::abs(local.z());
+    case ShapeKind::kSphere:
+      return middle + child.radius;
+    case ShapeKind::kBox:
+      return middle + local.cwiseAbs().dot(child.box_half);
+    case ShapeKind::kCapsule:
+      return middle + child.radius + child.half_length * std::abs(local.z());
     case ShapeKind::kCylinder:
       return middle + child.radius * local.head<2>().norm() + child.half_length * std::abs(local.z());
     case ShapeKind::kHull: {
@@ -117,7 +130,8 @@ double reach_along(const Child& child, const Placement& at, const Vec3& directio
       return middle + most;
     }
     case ShapeKind::kPlane:
-    case ShapeKind::kConcave: break;
+    case ShapeKind::kConcave:
+      break;
   }
   return HUGE_VAL;
 }
@@ -165,7 +179,8 @@ void FaceClipper::onto_face(const Feature& face, const Feature& other, const Vec
       const double dp = outwards.dot(p) - limit, dq = outwards.dot(q) - limit;
       if (dp <= 0) clipped_.push_back(p);
       // Of two points there is one line only, not one there and one back.
-      if (((dp < 0 && dq > 0) || (dp > 0 && dq < 0)) && !(n == 2 && i == 1)) clipped_.push_back(p + (dp / (dp - dq)) * (q - p));
+      if (((dp < 0 && dq > 0) || (dp > 0 && dq < 0)) && !(n == 2 && i == 1))
+        clipped_.push_back(p + (dp / (dp - dq)) * (q - p));
     }
     ring_.swap(clipped_);
   }

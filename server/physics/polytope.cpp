@@ -10,9 +10,11 @@
 namespace soda::physics {
 namespace {
 
-constexpr double kCoplanarCosine = 1 - 1e-9;  // triangles of a hull whose normals agree like this share a face (2.6 arc minutes)
-constexpr double kFaceLike = 0.996;           // cosine of 5 deg; edges that separate nearly along a face's normal are left to the face
-constexpr double kParallel = 1e-6;            // squared sine; such edges have no useful cross product
+constexpr double kCoplanarCosine =
+    1 - 1e-9;  // triangles of a hull whose normals agree like this share a face (2.6 arc minutes)
+constexpr double kFaceLike =
+    0.996;  // cosine of 5 deg; edges that separate nearly along a face's normal are left to the face
+constexpr double kParallel = 1e-6;  // squared sine; such edges have no useful cross product
 
 Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) { return (b - a).cross(c - a).normalized(); }
 
@@ -42,8 +44,10 @@ double support(const Polytope& p, const Vec3& direction) {
 Polytope box_polytope(const Vec3& half) {
   Polytope p;
   for (int i = 0; i < 8; ++i)
-    p.vertices.push_back(Vec3(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(), i & 4 ? half.z() : -half.z()));
-  constexpr std::uint32_t kLoops[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+    p.vertices.push_back(
+        Vec3(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(), i & 4 ? half.z() : -half.z()));
+  constexpr std::uint32_t kLoops[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                          {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
   for (std::uint32_t f = 0; f < 6; ++f) {
     Vec3 normal = Vec3::Zero();
     normal[f / 2] = f % 2 ? 1 : -1;
@@ -123,7 +127,8 @@ void triangle_polytope(const std::array<Vec3, 3>& corner, const Vec3& normal, Po
 
 void place(const Polytope& local, const Placement& at, Polytope& out) {
   out.vertices.resize(local.vertices.size());
-  for (std::size_t i = 0; i < local.vertices.size(); ++i) out.vertices[i] = at.position + at.rotation * local.vertices[i];
+  for (std::size_t i = 0; i < local.vertices.size(); ++i)
+    out.vertices[i] = at.position + at.rotation * local.vertices[i];
   out.faces = local.faces;
   for (Polytope::Face& f : out.faces) f.normal = at.rotation * f.normal;
   out.corners = local.corners;
@@ -134,7 +139,8 @@ void place(const Polytope& local, const Placement& at, Polytope& out) {
 void face_of(const Polytope& p, std::uint32_t face, Feature& feature) {
   feature.normal = p.faces[face].normal;
   feature.points.clear();
-  for (std::uint32_t i = 0; i < p.faces[face].count; ++i) feature.points.push_back(p.vertices[p.corners[p.faces[face].first + i]]);
+  for (std::uint32_t i = 0; i < p.faces[face].count; ++i)
+    feature.points.push_back(p.vertices[p.corners[p.faces[face].first + i]]);
 }
 
 void face_along(const Polytope& p, const Vec3& direction, Feature& feature) {
@@ -142,7 +148,8 @@ void face_along(const Polytope& p, const Vec3& direction, Feature& feature) {
   std::uint32_t best = 0;
   double best_cosine = -2;
   for (std::uint32_t f = 0; f < p.faces.size(); ++f)
-    if (const double cosine = p.faces[f].normal.dot(direction); cosine > best_cosine + kBetter) best = f, best_cosine = cosine;
+    if (const double cosine = p.faces[f].normal.dot(direction); cosine > best_cosine + kBetter)
+      best = f, best_cosine = cosine;
   face_of(p, best, feature);
 }
 

@@ -93,8 +93,8 @@ void ShapeStore::prepare(const Geometry& geometry, Child& child) {
       child.radius = c.radius;
       child.half_length = 0.5 * c.length;
       auto* s = own.make<btCylinderShapeZ>(btVector3(c.radius, c.radius, 0.5 * c.length));
-      // GJK sees a cylinder with rounded rims: a thinner one and a distance round it, so that touching is not overlapping.
-      // Contact points are on the true one (face_clipping.h).
+      // GJK sees a cylinder with rounded rims: a thinner one and a distance round it, so that touching is not
+      // overlapping. Contact points are on the true one (face_clipping.h).
       s->setMargin(0.1 * std::min(c.radius, 0.5 * c.length));
       child.shape = s;
       box(Vec3(c.radius, c.radius, 0.5 * c.length));

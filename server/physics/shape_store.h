@@ -19,25 +19,25 @@ enum class ShapeKind : std::uint8_t {
   kSphere,
   kBox,
   kHull,
-  kCapsule,   // along its z axis, as is
+  kCapsule,  // along its z axis, as is
   kCylinder,
-  kPlane,     // static only: solid below z = 0 of its own frame
-  kConcave,   // triangle mesh or height field; static only
+  kPlane,    // static only: solid below z = 0 of its own frame
+  kConcave,  // triangle mesh or height field; static only
 };
 
 // One shape of a body. A body with several is a compound; each pair of children has contact records of its own.
 struct Child {
   ShapeKind kind = ShapeKind::kSphere;
-  bool centred = false;              // pose is the identity
-  Pose pose;                         // in the body's frame (origin at the centre of mass)
-  Mat3 rotation = Mat3::Identity();  // of pose
+  bool centred = false;                                     // pose is the identity
+  Pose pose;                                                // in the body's frame (origin at the centre of mass)
+  Mat3 rotation = Mat3::Identity();                         // of pose
   Vec3 box_centre = Vec3::Zero(), box_half = Vec3::Zero();  // m, bounding box in the child's own frame
-  double radius = 0;                 // m; of a sphere, capsule, cylinder
-  double half_length = 0;            // m; of a capsule's or cylinder's cylindrical part
-  double inner_extent = 0;           // m, smallest half extent
-  const btConvexShape* shape = nullptr;      // for GJK; null where not convex
-  const Polytope* polytope = nullptr;        // of boxes and hulls
-  const TriangleSurface* surface = nullptr;  // where concave
+  double radius = 0;                                        // m; of a sphere, capsule, cylinder
+  double half_length = 0;                                   // m; of a capsule's or cylinder's cylindrical part
+  double inner_extent = 0;                                  // m, smallest half extent
+  const btConvexShape* shape = nullptr;                     // for GJK; null where not convex
+  const Polytope* polytope = nullptr;                       // of boxes and hulls
+  const TriangleSurface* surface = nullptr;                 // where concave
 };
 
 class ShapeStore {

@@ -7,7 +7,7 @@
 namespace soda::physics {
 namespace {
 
-constexpr double kFlatSine = 0.05;         // of the angle between two triangles; less bent is flat
+constexpr double kFlatSine = 0.05;  // of the angle between two triangles; less bent is flat
 constexpr std::uint32_t kLeafTriangles = 4;
 
 Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) { return (b - a).cross(c - a).normalized(); }
@@ -23,7 +23,8 @@ TriangleSurface::TriangleSurface(const TriangleMesh& mesh) : vertices_(mesh.vert
 TriangleSurface::TriangleSurface(const HeightField& field) : one_sided_(true) {
   for (std::uint32_t j = 0; j < field.rows; ++j)
     for (std::uint32_t i = 0; i < field.columns; ++i)
-      vertices_.emplace_back((i - 0.5 * (field.columns - 1)) * field.spacing_x, (j - 0.5 * (field.rows - 1)) * field.spacing_y,
+      vertices_.emplace_back((i - 0.5 * (field.columns - 1)) * field.spacing_x,
+                             (j - 0.5 * (field.rows - 1)) * field.spacing_y,
                              field.heights[std::size_t{j} * field.columns + i]);
   for (std::uint32_t j = 0; j + 1 < field.rows; ++j)
     for (std::uint32_t i = 0; i + 1 < field.columns; ++i) {
@@ -69,7 +70,9 @@ void TriangleSurface::find_bends() {
       const Vec3 m = (alike ? 1 : -1) * normal_of(vertices_[u[0]], vertices_[u[1]], vertices_[u[2]]);
       const Vec3 edge = (vertices_[t[(s.which + 1) % 3]] - vertices_[t[s.which]]).normalized();
       const double sine = n.cross(m).dot(edge);  // positive where the surface bends away from the front
-      const Bend bend = n.dot(m) > 0 && std::abs(sine) < kFlatSine ? Bend::kFlat : sine > 0 ? Bend::kConvex : Bend::kConcave;
+      const Bend bend = n.dot(m) > 0 && std::abs(sine) < kFlatSine ? Bend::kFlat
+                        : sine > 0                                 ? Bend::kConvex
+                                                                   : Bend::kConcave;
       bends_[s.triangle][s.which] = bend;
       const Bend turned = bend == Bend::kConvex ? Bend::kConcave : bend == Bend::kConcave ? Bend::kConvex : bend;
       bends_[o.triangle][o.which] = alike ? bend : turned;
@@ -100,10 +103,9 @@ void TriangleSurface::build_tree() {
     int axis = 0;
     (box.max - box.min).maxCoeff(&axis);
     const auto middle = [&](std::uint32_t t) { return boxes[t].min[axis] + boxes[t].max[axis]; };
-    std::nth_element(order_.begin() + first, order_.begin() + first + count / 2, order_.begin() + first + count,
-                     [&](std::uint32_t l, std::uint32_t r) {
-                       return middle(l) != middle(r) ? middle(l) < middle(r) : l < r;
-                     });
+    std::nth_element(
+        order_.begin() + first, order_.begin() + first + count / 2, order_.begin() + first + count,
+        [&](std::uint32_t l, std::uint32_t r) { return middle(l) != middle(r) ? middle(l) < middle(r) : l < r; });
     nodes_[n].first = static_cast<std::uint32_t>(nodes_.size());
     nodes_[n].count = 0;
     nodes_.push_back({{}, first, count / 2});

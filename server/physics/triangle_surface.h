@@ -1,5 +1,5 @@
-// Static surfaces of triangles: meshes and height fields. Finds the triangles near a box, and knows of each edge how the
-// surface bends there, so that bodies slide over the seams between triangles without catching on them.
+// Static surfaces of triangles: meshes and height fields. Finds the triangles near a box, and knows of each edge how
+// the surface bends there, so that bodies slide over the seams between triangles without catching on them.
 #pragma once
 
 #include <array>
@@ -12,10 +12,10 @@
 namespace soda::physics {
 
 enum class Bend : std::uint8_t {
-  kFlat,     // hardly bent: no edge to catch on
-  kConvex,   // seen from the front, where the corners run counter-clockwise
+  kFlat,    // hardly bent: no edge to catch on
+  kConvex,  // seen from the front, where the corners run counter-clockwise
   kConcave,
-  kOpen,     // no other triangle, or several
+  kOpen,  // no other triangle, or several
 };
 
 struct Triangle {

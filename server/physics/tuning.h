@@ -12,24 +12,25 @@ constexpr double kMatchDistance = 0.02;  // m; a point found this near to an old
 
 // ---- contact recycling: old anchors are kept while the pair has moved less than this since they were detected. Frozen
 // anchors are what keeps tall stacks from creeping, and save most detections in resting scenes.
-constexpr double kRecycleDistance = 0.05;       // m, relative translation, at most
-constexpr double kRecycleExtentShare = 0.2;     // and at most this share of the smaller half extent of the two
-constexpr double kRecycleHalfSine = 0.08715574274765817;  // sin(5 deg): and neither body has turned by more than 10 deg.
-constexpr double kRecycleCornerDistance = 0.005;  // m; but contacts of one or two points last only this far (a quarter of
-                                                  // the speculative distance, beyond which other corners were not looked at)
+constexpr double kRecycleDistance = 0.05;    // m, relative translation, at most
+constexpr double kRecycleExtentShare = 0.2;  // and at most this share of the smaller half extent of the two
+constexpr double kRecycleHalfSine = 0.08715574274765817;  // sin(5 deg): and neither body has turned by more than 10 deg
+// m; contacts of one or two points last only while no corner has moved this far: a quarter of the speculative distance,
+// beyond which other corners were not looked at.
+constexpr double kRecycleCornerDistance = 0.005;
 
 // ---- soft contacts (Catto, "Solver2D", 2024: soft constraints with sub-steps)
 constexpr double kContactHertzPerSubstepRate = 0.125;  // contact frequency as a share of the sub-step rate
 constexpr double kContactHertzCap = 1000;              // Hz
 constexpr double kContactDampingRatio = 10;
-constexpr double kStaticHertzFactor = 2;     // contacts with static bodies are stiffer ...
+constexpr double kStaticHertzFactor = 2;      // contacts with static bodies are stiffer ...
 constexpr double kStaticDampingFactor = 0.5;  // ... and less damped
 constexpr double kPushOutSpeed = 3;           // m/s, limit for removing penetration
 constexpr double kRestitutionThreshold = 1;   // m/s; slower approaches do not bounce
 
 // ---- integration
-constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning of anisotropic bodies is taken as free of torque terms
-constexpr int kMidpointIterations = 4;     // each gains a factor of about (angle per sub-step x anisotropy)
+constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning is taken as free of gyroscopic torque
+constexpr int kMidpointIterations = 4;  // each gains a factor of about (angle per sub-step x anisotropy)
 
 // ---- sleeping
 constexpr double kSleepSpeed = 0.05;  // m/s, of the centre of mass, and of the fastest point about it

@@ -17,13 +17,13 @@ using namespace std::chrono_literals;
 using border::Progress;
 
 constexpr auto kStatusEvery = 200ms;
-constexpr auto kStatusAtMost = 5ms;      // while a paced session waits for news of progress
-constexpr auto kIdle = 20ms;             // longest sleep: reports and signals are looked after in between
-// A neighbour that is waited for and silent for that long is asked again what it has; then half as often each time, because
-// it may just be at a long step, and would be sent the same things again and again.
+constexpr auto kStatusAtMost = 5ms;  // while a paced session waits for news of progress
+constexpr auto kIdle = 20ms;         // longest sleep: reports and signals are looked after in between
+// A neighbour that is waited for and silent for that long is asked again what it has; then half as often each time,
+// because it may just be at a long step, and would be sent the same things again and again.
 constexpr auto kPatience = 500ms;
 constexpr auto kPatienceMost = 4000ms;
-constexpr auto kFlushAtMost = 5s;        // for neighbours that have left already
+constexpr auto kFlushAtMost = 5s;  // for neighbours that have left already
 constexpr auto kFinishAtMost = 10s;
 
 double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }

@@ -1,5 +1,6 @@
-// One world at work: a loop, on the caller's thread, that carries messages between the protocol core and a transport, lets
-// the core work, and reports. Everything that depends on time happens here, and none of it can change a bit of the result.
+// One world at work: a loop, on the caller's thread, that carries messages between the protocol core and a transport,
+// lets the core work, and reports. Everything that depends on time happens here, and none of it can change a bit of the
+// result.
 #pragma once
 
 #include <atomic>
@@ -25,7 +26,7 @@ struct DaemonSettings {
   WorldId worlds = 1;
   std::uint32_t epoch = 0;
   Step last_step = 0;
-  Step window = 48;                     // K
+  Step window = 48;                      // K
   Step dump_first = -1, dump_last = -1;  // states to report; -1: none
 };
 
@@ -53,8 +54,8 @@ class Daemon {
   using Clock = std::chrono::steady_clock;
   // What is known of a neighbour's silence.
   struct Line {
-    Clock::time_point heard{};        // last message, or last question because none came
-    Clock::duration patience{};       // how long to wait before the next question
+    Clock::time_point heard{};   // last message, or last question because none came
+    Clock::duration patience{};  // how long to wait before the next question
   };
 
   bool receive_all();

@@ -18,8 +18,7 @@ void write_surely(dds::Writer<T>& writer, const T& sample, const std::function<b
 
 }  // namespace
 
-DdsReports::DdsReports(dds::Participant& participant, bool supervised, bool with_states,
-                       std::function<bool()> give_up)
+DdsReports::DdsReports(dds::Participant& participant, bool supervised, bool with_states, std::function<bool()> give_up)
     : supervised_(supervised),
       give_up_(std::move(give_up)),
       status_(participant, dds::status_topic()),
@@ -47,8 +46,8 @@ void DdsReports::transforms(const wire::Transforms& sample) { transforms_.write(
 bool DdsReports::finish(std::chrono::milliseconds at_most) {
   const auto until = std::chrono::steady_clock::now() + at_most;
   const auto left = [&] {
-    return std::max(std::chrono::milliseconds(1), std::chrono::duration_cast<std::chrono::milliseconds>(
-                                                      until - std::chrono::steady_clock::now()));
+    return std::max(std::chrono::milliseconds(1),
+                    std::chrono::duration_cast<std::chrono::milliseconds>(until - std::chrono::steady_clock::now()));
   };
   bool all = digests_.wait_acknowledged(left());
   all = status_.wait_acknowledged(left()) && all;

@@ -10,8 +10,8 @@ namespace soda::world {
 
 class DdsReports final : public Reports {
  public:
-  // `supervised`: somebody waits for this world's digests, and must have been met before the start. `with_states`: whole
-  // states are to be reported. `give_up` ends the waiting for a slow reader.
+  // `supervised`: somebody waits for this world's digests, and must have been met before the start. `with_states`:
+  // whole states are to be reported. `give_up` ends the waiting for a slow reader.
   DdsReports(dds::Participant& participant, bool supervised, bool with_states, std::function<bool()> give_up);
 
   bool listened_to() const override;

@@ -10,8 +10,8 @@
 namespace soda::world {
 namespace {
 
-// After a write that failed: a stopped or dead reader has left the history full, and every further attempt would cost the
-// loop another wait. Longer than a heartbeat, so that a reader that lives has had the time to acknowledge.
+// After a write that failed: a stopped or dead reader has left the history full, and every further attempt would cost
+// the loop another wait. Longer than a heartbeat, so that a reader that lives has had the time to acknowledge.
 constexpr std::chrono::milliseconds kRetryAfter{150};
 
 }  // namespace

@@ -1,6 +1,6 @@
-// Border messages over DDS: for each neighbour one writer and one reader, on topics of their own, so that nobody receives
-// what was meant for others. Order and numbering are the core's business; this only has to say honestly when a message
-// may have been lost.
+// Border messages over DDS: for each neighbour one writer and one reader, on topics of their own, so that nobody
+// receives what was meant for others. Order and numbering are the core's business; this only has to say honestly when a
+// message may have been lost.
 #pragma once
 
 #include <atomic>

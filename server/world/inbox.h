@@ -1,5 +1,5 @@
-// The queue between the threads on which messages come and the daemon's own. Not bounded by itself: the protocol core of
-// a sender keeps at most a few steps of messages in flight.
+// The queue between the threads on which messages come and the daemon's own. Not bounded by itself: the protocol core
+// of a sender keeps at most a few steps of messages in flight.
 #pragma once
 
 #include <atomic>
@@ -17,8 +17,8 @@ class Inbox {
  public:
   using Duration = std::chrono::steady_clock::duration;
 
-  void push(Incoming incoming);      // from any thread
-  void wake();                       // from any thread: ends the present or the next wait
+  void push(Incoming incoming);  // from any thread
+  void wake();                   // from any thread: ends the present or the next wait
   std::optional<Incoming> pop();
   // Blocks until there is something, wake() was called, or the time is up.
   void wait(Duration at_most);

@@ -40,10 +40,12 @@ std::uint64_t parse_hash(const std::string& text) {
 
 void check(const Options& o) {
   if (!dds::good_session_name(o.session))
-    throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" + o.session + "'");
+    throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" + o.session +
+                                "'");
   const bool has_scene = !o.scene.empty() || o.scene_fd >= 0;
   if (o.world == 0 && !has_scene) throw std::invalid_argument("--scene: world 0 needs one");
-  if (o.world != 0 && has_scene) throw std::invalid_argument("--scene: only world 0 has one; the others get it from there");
+  if (o.world != 0 && has_scene)
+    throw std::invalid_argument("--scene: only world 0 has one; the others get it from there");
   if (o.single && (o.world != 0 || o.worlds != 1))
     throw std::invalid_argument("--sync single: there is only one world then");
   if (o.world == 0 && o.dump_last > o.steps) throw std::invalid_argument("--dump-steps: beyond the last step");
@@ -58,12 +60,17 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.footer(kByHand);
   app.set_version_flag("--version", std::string("soda ") + kVersion + ", protocol " + std::to_string(kProtocolVersion));
   app.add_option("--session", o.session, "name of the session")->capture_default_str();
-  app.add_option("--world", o.world, "which world this is")->check(CLI::Range(0u, dds::kMaxWorlds - 1))->capture_default_str();
+  app.add_option("--world", o.world, "which world this is")
+      ->check(CLI::Range(0u, dds::kMaxWorlds - 1))
+      ->capture_default_str();
   app.add_option("--expect-scene", expect, "refuse to run any other scene than that with this hash");
   app.add_flag("--verbose,-v", o.verbose, "say more");
   const char* group = "World 0 only";
   app.add_option("--scene", o.scene, "scene file")->group(group);
-  app.add_option("--worlds", o.worlds, "how many worlds")->check(CLI::Range(1u, dds::kMaxWorlds))->capture_default_str()->group(group);
+  app.add_option("--worlds", o.worlds, "how many worlds")
+      ->check(CLI::Range(1u, dds::kMaxWorlds))
+      ->capture_default_str()
+      ->group(group);
   app.add_option("--sync", sync, "'conservative', or 'single': one world and no network, the reference")
       ->check(CLI::IsMember({"single", "conservative"}))
       ->capture_default_str()

@@ -1,6 +1,6 @@
-// How far a session may have got: the displayed step follows the clock on the wall, but never beyond the slowest world's
-// final step (slow motion), and no world's clock passes the displayed step by more than the window. A pure function of
-// what it is told, so that tests choose the time.
+// How far a session may have got: the displayed step follows the clock on the wall, but never beyond the slowest
+// world's final step (slow motion), and no world's clock passes the displayed step by more than the window. A pure
+// function of what it is told, so that tests choose the time.
 #pragma once
 
 #include "common/ids.h"

@@ -11,7 +11,8 @@ namespace soda::world {
 class PipeReports final : public Reports {
  public:
   // `fd`: -1 for none; then only `on_status` hears anything.
-  PipeReports(int fd, std::function<void(const wire::Status&)> on_status) : fd_(fd), out_(fd), on_status_(std::move(on_status)) {}
+  PipeReports(int fd, std::function<void(const wire::Status&)> on_status)
+      : fd_(fd), out_(fd), on_status_(std::move(on_status)) {}
 
   void session(const wire::Session& sample) { write(sample); }
   bool listened_to() const override { return true; }

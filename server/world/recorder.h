@@ -1,5 +1,5 @@
-// Makes reports of what the core computes: digests in batches, whole states of the steps asked for, transforms if anybody
-// wants them.
+// Makes reports of what the core computes: digests in batches, whole states of the steps asked for, transforms if
+// anybody wants them.
 #pragma once
 
 #include <chrono>

@@ -1,6 +1,6 @@
-// What a daemon tells those who watch the run: `soda run`, and world 0's session service. Two homes: DDS and, for the one
-// world of a run without network, a pipe. All calls come from the daemon's thread and may block when a reader is slow:
-// nothing is ever dropped but transforms.
+// What a daemon tells those who watch the run: `soda run`, and world 0's session service. Two homes: DDS and, for the
+// one world of a run without network, a pipe. All calls come from the daemon's thread and may block when a reader is
+// slow: nothing is ever dropped but transforms.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,8 @@ namespace soda::world {
 class Reports {
  public:
   virtual ~Reports() = default;
-  // Whether whoever is to watch this world listens already. The world becomes ready only then, so that nothing is missed.
+  // Whether whoever is to watch this world listens already. The world becomes ready only then, so that nothing is
+  // missed.
   virtual bool listened_to() const = 0;
   virtual void status(const wire::Status& sample) = 0;
   virtual void digests(const wire::Digests& sample) = 0;

@@ -29,8 +29,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A world that is done stays for neighbours that may still ask for something, until world 0 ends the session. If world 0
-// is gone for that long, nobody will.
+// A world that is done stays for neighbours that may still ask for something, until world 0 ends the session. If world
+// 0 is gone for that long, nobody will.
 constexpr auto kWithoutHost = 30s;
 constexpr auto kHostFinish = 5s;
 
@@ -74,7 +74,8 @@ wire::Session describe(const Options& options, const EncodedScene& scene) {
   s.protocol(options.protocol);
   s.version(kVersion);
   s.instance(random_word());
-  s.started(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count());
+  s.started(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+                .count());
   s.scene_name(scene.scene.name.substr(0, 200));
   s.scene_hash(scene_hash(scene.bytes));
   s.scene_bytes(scene.bytes.size());
@@ -110,13 +111,14 @@ void obey(Daemon& daemon, const wire::Control& control) {
 void print_summary(const Options& options, const Daemon& daemon, double wall) {
   if (options.supervised_by != 0) return;
   const border::CoreStats& stats = daemon.core().stats();
-  std::printf("world %u: step %lld is final; %zu bodies, %llu steps in %.2f s, %llu of them synchronised, "
-              "%llu mixed islands, %llu bodies arrived, %llu departed, %.1f MB sent, %llu interruptions\n",
-              options.world, static_cast<long long>(daemon.core().final_step()), daemon.core().own_bodies(),
-              static_cast<unsigned long long>(stats.steps), wall, static_cast<unsigned long long>(stats.syncs),
-              static_cast<unsigned long long>(stats.mixed_islands), static_cast<unsigned long long>(stats.arrived),
-              static_cast<unsigned long long>(stats.departed), 1e-6 * static_cast<double>(stats.bytes_sent),
-              static_cast<unsigned long long>(daemon.interruptions()));
+  std::printf(
+      "world %u: step %lld is final; %zu bodies, %llu steps in %.2f s, %llu of them synchronised, "
+      "%llu mixed islands, %llu bodies arrived, %llu departed, %.1f MB sent, %llu interruptions\n",
+      options.world, static_cast<long long>(daemon.core().final_step()), daemon.core().own_bodies(),
+      static_cast<unsigned long long>(stats.steps), wall, static_cast<unsigned long long>(stats.syncs),
+      static_cast<unsigned long long>(stats.mixed_islands), static_cast<unsigned long long>(stats.arrived),
+      static_cast<unsigned long long>(stats.departed), 1e-6 * static_cast<double>(stats.bytes_sent),
+      static_cast<unsigned long long>(daemon.interruptions()));
 }
 
 // Runs the daemon under the eyes of the signals.

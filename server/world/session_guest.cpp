@@ -37,28 +37,29 @@ SessionGuest::SessionGuest(dds::Participant& participant, const std::string& ses
         const std::lock_guard lock(mutex_);
         auto& chunks = offer(sample.instance()).chunks;
         if (chunks.empty()) chunks.resize(sample.count());
-        if (sample.count() != chunks.size()) return dds::refusals().add("soda/scene", "the number of chunks has changed");
+        if (sample.count() != chunks.size())
+          return dds::refusals().add("soda/scene", "the number of chunks has changed");
         chunks[sample.index()].assign(sample.bytes().begin(), sample.bytes().end());
         changed_.notify_all();
       });
-  admission_ = std::make_unique<dds::Reader<wire::Admission>>(
-      participant, dds::admission_topic(), [this](wire::Admission&& sample, const dds::WriterKey&) {
-        if (sample.nonce() != claim_.nonce()) return;
-        const std::lock_guard lock(mutex_);
-        offer(sample.instance()).admission = std::move(sample);
-        changed_.notify_all();
-      });
-  control_ = std::make_unique<dds::Reader<wire::Control>>(
-      participant, dds::control_topic(), [this](wire::Control&& sample, const dds::WriterKey&) {
-        const std::lock_guard tell_lock(tell_mutex_);
-        bool mine = false;
-        {
-          const std::lock_guard lock(mutex_);
-          offer(sample.instance()).control = sample;
-          mine = sample.instance() == instance_;
-        }
-        if (mine && on_control_) on_control_(sample);
-      });
+  admission_ = std::make_unique<dds::Reader<wire::Admission>>(participant, dds::admission_topic(),
+                                                              [this](wire::Admission&& sample, const dds::WriterKey&) {
+                                                                if (sample.nonce() != claim_.nonce()) return;
+                                                                const std::lock_guard lock(mutex_);
+                                                                offer(sample.instance()).admission = std::move(sample);
+                                                                changed_.notify_all();
+                                                              });
+  control_ = std::make_unique<dds::Reader<wire::Control>>(participant, dds::control_topic(),
+                                                          [this](wire::Control&& sample, const dds::WriterKey&) {
+                                                            const std::lock_guard tell_lock(tell_mutex_);
+                                                            bool mine = false;
+                                                            {
+                                                              const std::lock_guard lock(mutex_);
+                                                              offer(sample.instance()).control = sample;
+                                                              mine = sample.instance() == instance_;
+                                                            }
+                                                            if (mine && on_control_) on_control_(sample);
+                                                          });
   join_ = std::make_unique<dds::Writer<wire::Join>>(participant, dds::join_topic());
   join_->write(claim_);
 }
@@ -111,7 +112,8 @@ void SessionGuest::log_waiting() const {
   } else if (!offer.admission) {
     spdlog::info("waiting to be admitted to session '{}' as world {} ...", name_, claim_.world());
   } else {
-    const auto there = std::count_if(offer.chunks.begin(), offer.chunks.end(), [](const auto& c) { return !c.empty(); });
+    const auto there =
+        std::count_if(offer.chunks.begin(), offer.chunks.end(), [](const auto& c) { return !c.empty(); });
     spdlog::info("waiting for the scene of session '{}': {} of {} pieces are here ...", name_, there,
                  offer.chunks.size());
   }

@@ -32,8 +32,8 @@ class SessionGuest {
     wire::Session session;
     std::string encoded_scene;  // its hash is right
   };
-  // Blocks until the session has described itself, admitted this daemon and handed out its scene. Logs what it waits for.
-  // Nothing if `stop` said so. Throws Refused.
+  // Blocks until the session has described itself, admitted this daemon and handed out its scene. Logs what it waits
+  // for. Nothing if `stop` said so. Throws Refused.
   std::optional<Admitted> join(const std::function<bool()>& stop);
 
   // `on_control` hears the newest Control and all that follow, of the session that admitted this daemon. Null takes it
@@ -50,7 +50,8 @@ class SessionGuest {
     std::vector<std::string> chunks;  // by index; "" if not there yet
   };
 
-  // The offer of that session; with the lock held. There is room for a few, in case several daemons claim to be world 0.
+  // The offer of that session; with the lock held. There is room for a few, in case several daemons claim to be world
+  // 0.
   Offer& offer(std::uint64_t instance);
   std::optional<Admitted> ready() const;  // with the lock held; throws Refused
   void log_waiting() const;               // likewise

@@ -43,7 +43,8 @@ SessionHost::SessionHost(dds::Participant& participant, const wire::Session& ses
     on_control_(control);
   });
   session_reader_ = std::make_unique<dds::Reader<wire::Session>>(
-      participant, dds::session_topic(), [this](wire::Session&& other, const dds::WriterKey& writer) { heard(other, writer); });
+      participant, dds::session_topic(),
+      [this](wire::Session&& other, const dds::WriterKey& writer) { heard(other, writer); });
   join_reader_ = std::make_unique<dds::Reader<wire::Join>>(
       participant, dds::join_topic(), [this](wire::Join&& claim, const dds::WriterKey&) { heard(claim); });
   status_reader_ = std::make_unique<dds::Reader<wire::Status>>(

@@ -94,8 +94,10 @@ void SessionService::log_missing(double now) {
   next_log_ = now + kLogEvery;
   std::string missing, unready;
   for (std::size_t i = 0; i < seats_.size(); ++i) {
-    if (seats_[i].nonce == 0) missing += " " + std::to_string(i);
-    else if (seats_[i].state < wire::STATE_READY) unready += " " + std::to_string(i);
+    if (seats_[i].nonce == 0)
+      missing += " " + std::to_string(i);
+    else if (seats_[i].state < wire::STATE_READY)
+      unready += " " + std::to_string(i);
   }
   if (!missing.empty()) spdlog::info("waiting for worlds to join:{}", missing);
   if (!unready.empty()) spdlog::info("waiting for worlds to get ready:{}", unready);
@@ -103,7 +105,8 @@ void SessionService::log_missing(double now) {
 
 wire::Control SessionService::next(double now) {
   const auto all = [this](std::uint8_t state) {
-    return std::all_of(seats_.begin(), seats_.end(), [state](const Seat& s) { return s.nonce != 0 && s.state >= state; });
+    return std::all_of(seats_.begin(), seats_.end(),
+                       [state](const Seat& s) { return s.nonce != 0 && s.state >= state; });
   };
   if (phase_ == wire::PHASE_GATHERING && all(wire::STATE_READY)) {
     phase_ = wire::PHASE_RUNNING;

@@ -1,6 +1,6 @@
-// What world 0 does for the session besides being a world: it admits worlds, starts the run when all are ready, paces it,
-// and ends it when all are done. Knows no DDS: session_host.h brings it to the network; a run without network uses it as
-// it is. Not in the step path.
+// What world 0 does for the session besides being a world: it admits worlds, starts the run when all are ready, paces
+// it, and ends it when all are done. Knows no DDS: session_host.h brings it to the network; a run without network uses
+// it as it is. Not in the step path.
 #pragma once
 
 #include <condition_variable>
@@ -25,8 +25,8 @@ class SessionService {
   SessionService(const SessionService&) = delete;
   SessionService& operator=(const SessionService&) = delete;
 
-  // From any thread. Why the claim is refused, or "". Before the start, the seat of a daemon that has fallen silent is free
-  // for another.
+  // From any thread. Why the claim is refused, or "". Before the start, the seat of a daemon that has fallen silent is
+  // free for another.
   std::string join(const wire::Join& claim);
   void status(const wire::Status& status);
 

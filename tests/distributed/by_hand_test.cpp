@@ -1,5 +1,5 @@
-// Daemons started by hand: on one machine, with and without the command, over UDP alone, with a discovery server; and, where
-// that is allowed, on two hosts, which are two network namespaces here.
+// Daemons started by hand: on one machine, with and without the command, over UDP alone, with a discovery server; and,
+// where that is allowed, on two hosts, which are two network namespaces here.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -19,8 +19,9 @@ class ByHand : public SessionTest {
   }
   // World 0's options for the run of the reference.
   std::vector<std::string> host(const std::string& session, int worlds, const std::vector<std::string>& more) const {
-    std::vector<std::string> words = soda_world({"--session", session, "--world", "0", "--worlds", std::to_string(worlds),
-                                                 "--scene", file_, "--steps", "200", "--pace", "max"});
+    std::vector<std::string> words =
+        soda_world({"--session", session, "--world", "0", "--worlds", std::to_string(worlds), "--scene", file_,
+                    "--steps", "200", "--pace", "max"});
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -63,8 +64,8 @@ TEST_F(ByHand, AllInterfaces) { run_session({"--interface", "all"}, {{}}); }
 
 TEST_F(ByHand, SomeStartedByTheCommandSomeByHand) {
   const std::string session = new_session();
-  Program command(soda({"run", file_, "--session", session, "--worlds", "4", "--start", "0,2", "--steps", "200", "--pace",
-                        "max", "-q", "--hash-log", path("mixed.log")}),
+  Program command(soda({"run", file_, "--session", session, "--worlds", "4", "--start", "0,2", "--steps", "200",
+                        "--pace", "max", "-q", "--hash-log", path("mixed.log")}),
                   directory());
   ASSERT_TRUE(command.wrote("start the other worlds by hand", 30s)) << command.output();
   Program one(guest(session, 1, {}), directory());

@@ -94,8 +94,8 @@ TEST_F(Command, DiffNamesTheFirstBodyAndFieldThatDiffer) {
   EXPECT_NE(run({"diff", path("a.dump"), path("b.dump")}, 0).find("equal: 6 steps"), std::string::npos);
   EXPECT_NE(run({"diff", path("a.dump"), file}, 2).find("one is a dump"), std::string::npos);
 
-  // One bit of one position, and the checksum that guards it, as a faulty machine would have written them: the mantissa of
-  // body 1's x lies behind the file's header, the step's header and the body's id.
+  // One bit of one position, and the checksum that guards it, as a faulty machine would have written them: the mantissa
+  // of body 1's x lies behind the file's header, the step's header and the body's id.
   std::string bytes = read_text(path("a.dump"));
   bytes[48 + 32 + 8] ^= 1;
   std::ofstream(path("c.dump"), std::ios::binary) << bytes;

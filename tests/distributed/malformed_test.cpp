@@ -67,8 +67,8 @@ TEST(Malformed, SamplesAreRefusedCountedAndForgotten) {
   proper.payload({1, 2, 3});
   const std::vector<std::byte> bytes = encode(proper);
   std::vector<std::byte> endless = bytes, stranger = bytes;
-  for (std::size_t i = 12; i < 16; ++i) endless[i] = std::byte{0xff};   // the payload's length
-  for (std::size_t i = 4; i < 8; ++i) stranger[i] = std::byte{0xff};    // from
+  for (std::size_t i = 12; i < 16; ++i) endless[i] = std::byte{0xff};  // the payload's length
+  for (std::size_t i = 4; i < 8; ++i) stranger[i] = std::byte{0xff};   // from
   const std::vector<std::byte> cut(bytes.begin(), bytes.begin() + 9), stub(2), noise(100, std::byte{0xa5});
   constexpr int kRounds = 50;
   for (int round = 0; round < kRounds; ++round)

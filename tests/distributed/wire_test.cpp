@@ -1,5 +1,5 @@
-// Wire types as bytes: what is encoded is decoded; whatever else comes is refused, without a crash and without taking the
-// memory that it claims to need.
+// Wire types as bytes: what is encoded is decoded; whatever else comes is refused, without a crash and without taking
+// the memory that it claims to need.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

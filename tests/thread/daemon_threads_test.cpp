@@ -112,8 +112,7 @@ RunResult run(const Scene& scene, WorldId worlds, Step steps, double pace, doubl
   }
   std::vector<std::thread> threads;
   std::atomic<int> done{0};
-  for (const auto& daemon : daemons)
-    threads.emplace_back([&] { done += daemon->run() == Daemon::End::kDone; });
+  for (const auto& daemon : daemons) threads.emplace_back([&] { done += daemon->run() == Daemon::End::kDone; });
   for (std::thread& thread : threads) thread.join();
   service.reset();
   EXPECT_EQ(done.load(), static_cast<int>(worlds));

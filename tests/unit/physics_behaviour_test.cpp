@@ -131,8 +131,8 @@ TEST(Stack, TenOfAKindStand) {
   const std::vector<std::pair<const char*, Geometry>> kinds = {
       {"boxes", Box{Vec3(0.5, 0.5, 0.5)}},
       {"cylinders", Cylinder{0.25, 0.5}},
-      {"hulls", ConvexHull{{Vec3(.3, .3, .2), Vec3(-.3, .3, .2), Vec3(-.3, -.3, .2), Vec3(.3, -.3, .2), Vec3(.2, .2, -.2),
-                            Vec3(-.2, .2, -.2), Vec3(-.2, -.2, -.2), Vec3(.2, -.2, -.2)}}}};
+      {"hulls", ConvexHull{{Vec3(.3, .3, .2), Vec3(-.3, .3, .2), Vec3(-.3, -.3, .2), Vec3(.3, -.3, .2),
+                            Vec3(.2, .2, -.2), Vec3(-.2, .2, -.2), Vec3(-.2, -.2, -.2), Vec3(.2, -.2, -.2)}}}};
   for (const auto& [name, geometry] : kinds) {
     SceneBuilder builder(name);
     builder.scene.sleeping = false;
@@ -248,7 +248,8 @@ TEST(Contact, BodiesThatTipOverDoNotSinkIn) {
     SceneBuilder builder("tilt");
     builder.scene.sleeping = false;
     const double angle = degrees * 3.14159265358979 / 180;
-    builder.add(Box{Vec3(1, 1, 1)}, Vec3(0, 0, 0.5 * (std::cos(angle) + std::sin(angle))), rotation_of(Vec3(0, angle, 0)));
+    builder.add(Box{Vec3(1, 1, 1)}, Vec3(0, 0, 0.5 * (std::cos(angle) + std::sin(angle))),
+                rotation_of(Vec3(0, angle, 0)));
     builder.add_ground(200);
     World world(builder);
     double lowest = 0;

@@ -14,24 +14,30 @@
 namespace soda::physics::test {
 namespace {
 
-constexpr Kind kConvex[] = {Kind::kSphere, Kind::kBox, Kind::kCapsule, Kind::kCylinder, Kind::kHull, Kind::kTetrahedron};
+constexpr Kind kConvex[] = {Kind::kSphere,   Kind::kBox,  Kind::kCapsule,
+                            Kind::kCylinder, Kind::kHull, Kind::kTetrahedron};
 
 // A scene of one body of each convex kind, for its shapes.
 class Shapes {
  public:
   Shapes() : model_(make()) {}
   const Child& child(Kind kind) const {
-    const BodyModel& body = model_.bodies()[static_cast<std::size_t>(std::find(std::begin(kConvex), std::end(kConvex), kind) - kConvex)];
+    const BodyModel& body =
+        model_.bodies()[static_cast<std::size_t>(std::find(std::begin(kConvex), std::end(kConvex), kind) - kConvex)];
     return model_.shapes().children()[body.first_child];
   }
   // m, how far the shape reaches along `direction` in its own frame.
   double reach(Kind kind, const Vec3& direction) const {
     const Child& c = child(kind);
     switch (kind) {
-      case Kind::kSphere: return c.radius;
-      case Kind::kBox: return direction.cwiseAbs().dot(c.box_half);
-      case Kind::kCapsule: return c.radius + c.half_length * std::abs(direction.z());
-      case Kind::kCylinder: return c.radius * direction.head<2>().norm() + c.half_length * std::abs(direction.z());
+      case Kind::kSphere:
+        return c.radius;
+      case Kind::kBox:
+        return direction.cwiseAbs().dot(c.box_half);
+      case Kind::kCapsule:
+        return c.radius + c.half_length * std::abs(direction.z());
+      case Kind::kCylinder:
+        return c.radius * direction.head<2>().norm() + c.half_length * std::abs(direction.z());
       default: {
         double most = -HUGE_VAL;
         for (const Vec3& p : points(kind)) most = std::max(most, direction.dot(p));
@@ -43,10 +49,14 @@ class Shapes {
   double height(Kind kind, const Vec3& p) const {
     const Child& c = child(kind);
     switch (kind) {
-      case Kind::kSphere: return p.norm() - c.radius;
-      case Kind::kBox: return (p.cwiseAbs() - c.box_half).maxCoeff();
-      case Kind::kCapsule: return (p - Vec3(0, 0, std::clamp(p.z(), -c.half_length, c.half_length))).norm() - c.radius;
-      case Kind::kCylinder: return std::max(p.head<2>().norm() - c.radius, std::abs(p.z()) - c.half_length);
+      case Kind::kSphere:
+        return p.norm() - c.radius;
+      case Kind::kBox:
+        return (p.cwiseAbs() - c.box_half).maxCoeff();
+      case Kind::kCapsule:
+        return (p - Vec3(0, 0, std::clamp(p.z(), -c.half_length, c.half_length))).norm() - c.radius;
+      case Kind::kCylinder:
+        return std::max(p.head<2>().norm() - c.radius, std::abs(p.z()) - c.half_length);
       default: {
         const auto& all = points(kind);
         double most = -HUGE_VAL;
@@ -93,7 +103,8 @@ class Contacts : public testing::TestWithParam<std::tuple<Kind, Kind>> {
       if (const double s = separation(at, d); s > most) most = s, best = d;
     };
     for (int axis = 0; axis < 3; ++axis)
-      for (const double sign : {-1.0, 1.0}) consider(sign * at.a.rotation.col(axis)), consider(sign * at.b.rotation.col(axis));
+      for (const double sign : {-1.0, 1.0})
+        consider(sign * at.a.rotation.col(axis)), consider(sign * at.b.rotation.col(axis));
     for (int i = 0; i < 300; ++i) consider(random.direction());
     for (double width = 0.3; width > 1e-6; width *= 0.9)
       for (int i = 0; i < 8; ++i) consider((best + width * random.direction()).normalized());
@@ -134,8 +145,8 @@ TEST_P(Contacts, AgreeWithGeometry) {
     if (points.empty()) continue;
     ++touching;
     several += points.size() > 1;
-    // m; tolerances of clipping and of rims that are octagons; any amount where fast bodies get slack. (Deep points may lie
-    // inside.)
+    // m; tolerances of clipping and of rims that are octagons; any amount where fast bodies get slack. (Deep points may
+    // lie inside.)
     const double slack = slack_beside(max_distance) > 0 ? 1 : 0.015;
     double least = HUGE_VAL;
     for (const DetectedPoint& p : points) {
@@ -147,7 +158,8 @@ TEST_P(Contacts, AgreeWithGeometry) {
       // Points are relative to a's place; on the surfaces but for tolerances of clipping and rounded rims.
       EXPECT_LT(std::abs(shapes.height(kind_a, at.a.rotation.transpose() * p.on_a)), off) << trial;
       EXPECT_LT(std::abs(shapes.height(kind_b, at.b.rotation.transpose() * (p.on_b - (at.b.position - at.a.position)))),
-                off) << trial;
+                off)
+          << trial;
       least = std::min(least, p.distance);
     }
     const double along = separation(at, points[0].normal);
@@ -167,7 +179,8 @@ TEST_P(Contacts, AgreeWithGeometry) {
 
 INSTANTIATE_TEST_SUITE_P(Pairs, Contacts, testing::Combine(testing::ValuesIn(kConvex), testing::ValuesIn(kConvex)),
                          [](const auto& test) {
-                           return std::string(name_of(std::get<0>(test.param))) + "_" + name_of(std::get<1>(test.param));
+                           return std::string(name_of(std::get<0>(test.param))) + "_" +
+                                  name_of(std::get<1>(test.param));
                          });
 
 TEST(BoxContacts, FacesGiveFourCornersOfTheirOverlap) {
@@ -202,7 +215,8 @@ TEST(BoxContacts, TurnedFacesGiveEightAndCrossedEdgesOne) {
   EXPECT_EQ(points.size(), 8u);
   // One lies on its edge along x, the other on its edge along y.
   detector.detect(cube, {Vec3::Zero(), rotation_of(Vec3(quarter, 0, 0)).toRotationMatrix()}, cube,
-                  {Vec3(0, 0, std::sqrt(2.0) - 0.002), rotation_of(Vec3(0, quarter, 0)).toRotationMatrix()}, 0.02, points);
+                  {Vec3(0, 0, std::sqrt(2.0) - 0.002), rotation_of(Vec3(0, quarter, 0)).toRotationMatrix()}, 0.02,
+                  points);
   ASSERT_EQ(points.size(), 1u);
   EXPECT_LT((points[0].normal - Vec3::UnitZ()).norm(), 1e-9);
   EXPECT_NEAR(points[0].distance, -0.002, 1e-9);

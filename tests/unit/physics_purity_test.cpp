@@ -1,6 +1,6 @@
-// The step is a pure function: the state at t + 1 has the same bits however t came about and however the work is cut up.
-// Each test runs a scene twice, side by side, and compares every bit of every state, contact records included. This is
-// what rollback, load balancing, restarts and any number of worlds rest on.
+// The step is a pure function: the state at t + 1 has the same bits however t came about and however the work is cut
+// up. Each test runs a scene twice, side by side, and compares every bit of every state, contact records included. This
+// is what rollback, load balancing, restarts and any number of worlds rest on.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -122,8 +122,8 @@ BodySet merged(const BodySet& a, const BodySet& b) {
   BodySet all;
   std::merge(a.bodies.begin(), a.bodies.end(), b.bodies.begin(), b.bodies.end(), std::back_inserter(all.bodies),
              [](const BodyState& l, const BodyState& r) { return l.id < r.id; });
-  std::merge(a.contacts.begin(), a.contacts.end(), b.contacts.begin(), b.contacts.end(), std::back_inserter(all.contacts),
-             record_before);
+  std::merge(a.contacts.begin(), a.contacts.end(), b.contacts.begin(), b.contacts.end(),
+             std::back_inserter(all.contacts), record_before);
   return all;
 }
 
@@ -164,7 +164,8 @@ TEST_P(Purity, RestoredAndRunAgain) {
     for (std::size_t k = 0; k < past.size(); ++k) {
       reference.step(again);
       const std::string difference = first_difference(past[k], again);
-      ASSERT_TRUE(difference.empty()) << GetParam().name << ", step " << t - 60 + static_cast<int>(k) + 1 << ": " << difference;
+      ASSERT_TRUE(difference.empty()) << GetParam().name << ", step " << t - 60 + static_cast<int>(k) + 1 << ": "
+                                      << difference;
     }
     saved = state;
     past.clear();

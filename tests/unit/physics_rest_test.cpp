@@ -17,11 +17,16 @@ constexpr double kSeam = 0.37;  // m, between the triangles' vertices: bodies li
 void add_ground(SceneBuilder& builder, Ground ground) {
   constexpr int kSide = 9;
   switch (ground) {
-    case Ground::kPlane: builder.add_static(Plane{}, Vec3::Zero()); break;
-    case Ground::kTiltedPlane:  // the body frame is tilted one way, the plane in it back again
-      builder.add_static(Plane{Vec3(-0.6, 0, 0.8)}, Vec3::Zero(), Quat::FromTwoVectors(Vec3(-0.6, 0, 0.8), Vec3(0, 0, 1)));
+    case Ground::kPlane:
+      builder.add_static(Plane{}, Vec3::Zero());
       break;
-    case Ground::kBox: builder.add_ground(20); break;
+    case Ground::kTiltedPlane:  // the body frame is tilted one way, the plane in it back again
+      builder.add_static(Plane{Vec3(-0.6, 0, 0.8)}, Vec3::Zero(),
+                         Quat::FromTwoVectors(Vec3(-0.6, 0, 0.8), Vec3(0, 0, 1)));
+      break;
+    case Ground::kBox:
+      builder.add_ground(20);
+      break;
     case Ground::kMesh: {
       TriangleMesh mesh;
       for (int j = 0; j < kSide; ++j)
@@ -107,7 +112,8 @@ TEST_P(Rest, FallsAsleep) {
 
 INSTANTIATE_TEST_SUITE_P(Shapes, Rest,
                          testing::Combine(testing::Values(Kind::kSphere, Kind::kBox, Kind::kCapsule, Kind::kCylinder,
-                                                          Kind::kHull, Kind::kTetrahedron, Kind::kTable, Kind::kDumbbell),
+                                                          Kind::kHull, Kind::kTetrahedron, Kind::kTable,
+                                                          Kind::kDumbbell),
                                           testing::Values(Ground::kPlane, Ground::kBox, Ground::kMesh,
                                                           Ground::kHeightField, Ground::kTiltedPlane)),
                          [](const auto& test) {
@@ -141,7 +147,8 @@ TEST(Surfaces, BoxesAndCylindersSlideOverSeamsWithoutCatching) {
     const double on_box = way_over(Ground::kBox, kind, &high_box);
     EXPECT_GT(on_box, 0.1);
     for (const Ground ground : {Ground::kMesh, Ground::kHeightField}) {
-      EXPECT_NEAR(way_over(ground, kind, &high), on_box, 0.02) << name_of(kind) << " on " << kGroundNames[static_cast<int>(ground)];
+      EXPECT_NEAR(way_over(ground, kind, &high), on_box, 0.02)
+          << name_of(kind) << " on " << kGroundNames[static_cast<int>(ground)];
       EXPECT_LT(high, 0.155);
     }
   }
@@ -171,7 +178,8 @@ TEST(Surfaces, RidgesAndRimsHoldBodiesUp) {
   SceneBuilder builder("roof");
   builder.scene.sleeping = false;
   TriangleMesh roof;
-  roof.vertices = {Vec3(-1, -2, -0.5), Vec3(0, -2, 0), Vec3(1, -2, -0.5), Vec3(-1, 2, -0.5), Vec3(0, 2, 0), Vec3(1, 2, -0.5)};
+  roof.vertices = {Vec3(-1, -2, -0.5), Vec3(0, -2, 0), Vec3(1, -2, -0.5),
+                   Vec3(-1, 2, -0.5),  Vec3(0, 2, 0),  Vec3(1, 2, -0.5)};
   roof.triangles = {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}};
   builder.add(Box{Vec3(2, 0.2, 0.2)}, Vec3(0.001, -1, 0.11));
   builder.add(Sphere{0.2}, Vec3(0.02, 1, 0.21));

@@ -77,18 +77,24 @@ const char* name_of(Kind kind) {
 
 Body& add_shape(SceneBuilder& builder, Kind kind, const Vec3& position, const Quat& orientation) {
   switch (kind) {
-    case Kind::kSphere: return builder.add(Sphere{0.25}, position, orientation);
-    case Kind::kBox: return builder.add(Box{Vec3(0.5, 0.4, 0.3)}, position, orientation);
-    case Kind::kCapsule: return builder.add(Capsule{0.15, 0.4}, position, orientation);
-    case Kind::kCylinder: return builder.add(Cylinder{0.25, 0.3}, position, orientation);
-    case Kind::kHull: return builder.add(random_hull(16, 0.3, 7), position, orientation);
+    case Kind::kSphere:
+      return builder.add(Sphere{0.25}, position, orientation);
+    case Kind::kBox:
+      return builder.add(Box{Vec3(0.5, 0.4, 0.3)}, position, orientation);
+    case Kind::kCapsule:
+      return builder.add(Capsule{0.15, 0.4}, position, orientation);
+    case Kind::kCylinder:
+      return builder.add(Cylinder{0.25, 0.3}, position, orientation);
+    case Kind::kHull:
+      return builder.add(random_hull(16, 0.3, 7), position, orientation);
     case Kind::kTetrahedron:
-      return builder.add(ConvexHull{{Vec3(.3, .3, .3), Vec3(.3, -.3, -.3), Vec3(-.3, .3, -.3), Vec3(-.3, -.3, .3)}}, position,
-                         orientation);
+      return builder.add(ConvexHull{{Vec3(.3, .3, .3), Vec3(.3, -.3, -.3), Vec3(-.3, .3, -.3), Vec3(-.3, -.3, .3)}},
+                         position, orientation);
     case Kind::kTable: {  // a top and four legs
       Body& table = builder.add(Box{Vec3(0.6, 0.6, 0.1)}, position, orientation);
       for (double x : {-0.25, 0.25})
-        for (double y : {-0.25, 0.25}) table.shapes.push_back(shape(builder, Box{Vec3(0.1, 0.1, 0.3)}, Vec3(x, y, -0.2)));
+        for (double y : {-0.25, 0.25})
+          table.shapes.push_back(shape(builder, Box{Vec3(0.1, 0.1, 0.3)}, Vec3(x, y, -0.2)));
       return table;
     }
     case Kind::kDumbbell: {  // two different balls on a bar
@@ -99,7 +105,8 @@ Body& add_shape(SceneBuilder& builder, Kind kind, const Vec3& position, const Qu
       dumbbell.shapes.push_back(shape(builder, Sphere{0.15}, Vec3(-0.2, 0, 0)));
       return dumbbell;
     }
-    case Kind::kCount: break;
+    case Kind::kCount:
+      break;
   }
   throw std::invalid_argument("no such kind of shape");
 }
@@ -111,8 +118,8 @@ Scene shapes_scene() {
   for (double x : {-6.0, -2.0, 2.0, 6.0})  // bowl, plane, box, height field
     for (std::uint32_t i = 0; i < 16; ++i, ++n) {
       const Vec3 at(x + 0.8 * (i % 2 - 0.5), 0.8 * (i / 2 % 2 - 0.5), 1.3 + 0.8 * (i / 4));
-      Body& body = add_shape(builder, static_cast<Kind>((i + n / 16) % 8), at + random.between(Vec3::Constant(-.02), Vec3::Constant(.02)),
-                             random.orientation());
+      Body& body = add_shape(builder, static_cast<Kind>((i + n / 16) % 8),
+                             at + random.between(Vec3::Constant(-.02), Vec3::Constant(.02)), random.orientation());
       body.friction = 0.4 + 0.1 * (i % 4);
       body.angular_damping = 0.3;  // round things would roll for long
       if (i % 5 == 0) body.restitution = 0.4;
@@ -130,11 +137,12 @@ Scene wide_scene() {
   const Box crate{Vec3(0.3, 0.3, 0.3)};
   for (int x = -2; x <= 2; ++x)
     for (int y = -1; y <= 1; ++y) builder.add(crate, Vec3(2.5 * x, y, 0.16));
-  builder.add(Box{Vec3(11, 3, 0.2)}, Vec3(0, 0, 0.45));               // a slab on fifteen crates
+  builder.add(Box{Vec3(11, 3, 0.2)}, Vec3(0, 0, 0.45));                                 // a slab on fifteen crates
   builder.add(Box{Vec3(8, 0.3, 0.1)}, Vec3(0, 1, 1.2), rotation_of(Vec3(0, 0.05, 0)));  // a plank that falls on it
   builder.add(Sphere{1.5}, Vec3(3, -0.5, 4));
   for (int i = 0; i < 40; ++i)
-    builder.add(crate, random.between(Vec3(-5, -1.3, 1.6), Vec3(1, 1.3, 1.7)) + Vec3(0, 0, 0.5 * (i % 8)), random.orientation());
+    builder.add(crate, random.between(Vec3(-5, -1.3, 1.6), Vec3(1, 1.3, 1.7)) + Vec3(0, 0, 0.5 * (i % 8)),
+                random.orientation());
   builder.add_ground(200);
   return builder.finish();
 }
@@ -196,15 +204,15 @@ std::string difference(const ContactRecord& e, const ContactRecord& g) {
            std::to_string(r.part) + ", " + std::to_string(r.count) + " points";
   };
   if (name(e) != name(g)) return "is of " + name(g);
-  for (const std::string& text :
-       {compare("normal", e.normal, g.normal), compare("offset", e.offset, g.offset),
-        compare("orientation_a", e.orientation_a, g.orientation_a), compare("orientation_b", e.orientation_b, g.orientation_b),
-        compare("friction", e.friction, g.friction), compare("twist", {e.twist}, {g.twist})})
+  for (const std::string& text : {compare("normal", e.normal, g.normal), compare("offset", e.offset, g.offset),
+                                  compare("orientation_a", e.orientation_a, g.orientation_a),
+                                  compare("orientation_b", e.orientation_b, g.orientation_b),
+                                  compare("friction", e.friction, g.friction), compare("twist", {e.twist}, {g.twist})})
     if (!text.empty()) return text;
   for (std::size_t i = 0; i < kMaxContactPoints; ++i)
-    for (const std::string& text :
-         {compare("arm_a", e.points[i].arm_a, g.points[i].arm_a), compare("arm_b", e.points[i].arm_b, g.points[i].arm_b),
-          compare("impulse", {e.points[i].impulse}, {g.points[i].impulse})})
+    for (const std::string& text : {compare("arm_a", e.points[i].arm_a, g.points[i].arm_a),
+                                    compare("arm_b", e.points[i].arm_b, g.points[i].arm_b),
+                                    compare("impulse", {e.points[i].impulse}, {g.points[i].impulse})})
       if (!text.empty()) return "point " + std::to_string(i) + " " + text;
   return "unknown";
 }
@@ -219,7 +227,8 @@ std::string first_difference(const BodySet& expected, const BodySet& got) {
   for (std::size_t i = 0; i < std::min(expected.contacts.size(), got.contacts.size()); ++i)
     if (std::memcmp(&expected.contacts[i], &got.contacts[i], sizeof(ContactRecord)) != 0)
       return "record of " + std::to_string(expected.contacts[i].a) + "/" +
-             std::to_string(expected.contacts[i].b & ~kStaticBit) + ": " + difference(expected.contacts[i], got.contacts[i]);
+             std::to_string(expected.contacts[i].b & ~kStaticBit) + ": " +
+             difference(expected.contacts[i], got.contacts[i]);
   if (expected.contacts.size() != got.contacts.size())
     return std::to_string(got.contacts.size()) + " records, should be " + std::to_string(expected.contacts.size());
   return {};
