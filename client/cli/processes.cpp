@@ -122,7 +122,7 @@ std::size_t Processes::running() const {
       std::count_if(processes_.begin(), processes_.end(), [](const auto& process) { return process->running; }));
 }
 
-void Processes::stop(std::chrono::milliseconds patience) {
+void Processes::stop(std::chrono::milliseconds patience, const std::function<void()>& meanwhile) {
   const auto signal_all = [this](int number) {
     for (const auto& process : processes_)
       if (process->running) ::kill(process->pid, number);
@@ -136,6 +136,7 @@ void Processes::stop(std::chrono::milliseconds patience) {
       signal_all(SIGKILL);
       killed = true;
     }
+    if (meanwhile) meanwhile();
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
 }

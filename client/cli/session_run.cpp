@@ -94,7 +94,11 @@ int follow(ReportSource& source, Processes& processes, Table& table, StopSignals
   }
   table.clear();
   const bool complete = collector.complete();
-  processes.stop(kStopAtMost);
+  // A daemon may be waiting for room in its pipe.
+  processes.stop(kStopAtMost, [&] {
+    while (source.next(0ms)) {
+    }
+  });
   try {
     collector.close();
     if (!options.stats.empty()) write_stats(options.stats, collector, complete);

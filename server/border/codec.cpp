@@ -40,6 +40,7 @@ class Reader {
   }
   void get_bytes(void* to, std::size_t size, const char* field) {
     if (in_.size() < size) throw CodecError(std::string(field) + ": cut short");
+    if (size == 0) return;  // `to` may be null then
     std::memcpy(to, in_.data(), size);
     in_ = in_.subspan(size);
   }

@@ -71,15 +71,19 @@ TEST_P(Purity, RebuiltFromBytesEveryStep) {
   int t = 0;
   std::unique_ptr<Model> fresh_model;
   run_beside([&](BodySet& set) {
-    bodies.resize(set.bodies.size() * sizeof(BodyState));
-    contacts.resize(set.contacts.size() * sizeof(ContactRecord));
-    std::memcpy(bodies.data(), set.bodies.data(), bodies.size());
-    std::memcpy(contacts.data(), set.contacts.data(), contacts.size());
+    const auto to_bytes = [](const auto& from, std::vector<unsigned char>& bytes) {
+      const auto* first = reinterpret_cast<const unsigned char*>(from.data());
+      bytes.assign(first, first + from.size() * sizeof from[0]);
+    };
+    const auto from_bytes = [](const std::vector<unsigned char>& bytes, auto& to) {
+      to.resize(bytes.size() / sizeof to[0]);
+      std::copy(bytes.begin(), bytes.end(), reinterpret_cast<unsigned char*>(to.data()));
+    };
+    to_bytes(set.bodies, bodies);
+    to_bytes(set.contacts, contacts);
     BodySet copy;
-    copy.bodies.resize(set.bodies.size());
-    copy.contacts.resize(set.contacts.size());
-    std::memcpy(copy.bodies.data(), bodies.data(), bodies.size());
-    std::memcpy(copy.contacts.data(), contacts.data(), contacts.size());
+    from_bytes(bodies, copy.bodies);
+    from_bytes(contacts, copy.contacts);
     if (t++ % 50 == 0) fresh_model = std::make_unique<Model>(GetParam().make());
     Stepper(*fresh_model).step(copy);
     set = std::move(copy);
