@@ -61,6 +61,7 @@ set style fill solid 0.8
 set yrange [0:*]
 set ylabel 'steps/s relative to one world'
 set grid ytics
+set bmargin 4
 set title 'One world and two, over DDS (sleeping off; two cores)'
 plot 'worlds.csv' skip 1 using 0:5:xtic(stringcolumn(1)."\n".stringcolumn(2)) lc rgb '#d1603d' notitle
 )";
