@@ -18,6 +18,7 @@
 #include "client/cli/dds_source.h"
 #include "client/cli/session_run.h"
 #include "common/dds/checks.h"
+#include "common/dds/shm_cleanup.h"
 #include "common/grid.h"
 #include "common/import/load.h"
 #include "common/run_settings.h"
@@ -167,6 +168,7 @@ int run(RunOptions& options) {
     pipe_out = std::make_unique<Descriptor>(fds[1]);
     source = std::make_unique<PipeSource>(pipe_in->get());
   } else {
+    dds::remove_stale_segments();
     source = std::make_unique<DdsSource>(options.network, options.session, !options.follow.files.dump.empty());
   }
   Processes processes(

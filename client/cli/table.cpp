@@ -63,6 +63,9 @@ double Table::Speed::at(Clock::time_point now, Step final_now) {
     then = now;
     final_step = final_now;
   }
+  // In the first second: what there is.
+  const double passed = std::chrono::duration<double>(now - then).count();
+  if (steps_per_second == 0 && passed > 0.1) return static_cast<double>(final_now - final_step) / passed;
   return steps_per_second;
 }
 

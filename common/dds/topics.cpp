@@ -57,7 +57,7 @@ Topic transforms_topic() {
 // only has to hold what is under way. A write must not hold up the loop, which then treats the connection as
 // interrupted. TRANSIENT_LOCAL: VOLATILE writers of Fast DDS 2.9 drop a sample when a full history drains.
 Topic border_topic(WorldId from, WorldId to) {
-  return {"soda/border/" + std::to_string(from) + "/" + std::to_string(to), all(64, Millis(10))};
+  return {"soda/border/" + std::to_string(from) + "/" + std::to_string(to), all(64, Millis(30))};
 }
 
 }  // namespace soda::dds

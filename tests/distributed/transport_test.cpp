@@ -69,19 +69,28 @@ TEST_P(Transports, EightMebibytesArriveWhole) {
   }
 }
 
+// In order, and complete but for what an interruption has told of: then the sender goes back, as the core does.
 TEST_P(Transports, ThousandsArriveInOrder) {
   auto a = make(0), b = make(1);
   ASSERT_TRUE(meet(*a, *b));
   constexpr std::uint32_t kMessages = 5000;
   std::uint32_t sent = 0, got = 0;
-  while (got < kMessages) {
+  const auto until = std::chrono::steady_clock::now() + 60s;
+  while (got < kMessages && std::chrono::steady_clock::now() < until) {
+    while (const auto back = a->transport.receive())
+      if (back->kind == Incoming::Kind::kInterrupted) sent = got;
     for (; sent < kMessages && sent < got + 20; ++sent) a->transport.send(1, message(200, sent));
-    const auto incoming = next(*b, 5s);
-    ASSERT_TRUE(incoming) << got;
-    ASSERT_EQ(incoming->kind, Incoming::Kind::kMessage) << got;
-    ASSERT_TRUE(incoming->bytes == message(200, got)) << got;
-    ++got;
+    const auto incoming = next(*b, 20ms);
+    if (!incoming || incoming->kind != Incoming::Kind::kMessage) continue;
+    if (incoming->bytes == message(200, got)) {
+      ++got;
+      continue;
+    }
+    bool again = false;
+    for (std::uint32_t i = got > 40 ? got - 40 : 0; i < got; ++i) again = again || incoming->bytes == message(200, i);
+    ASSERT_TRUE(again) << "out of order at " << got;
   }
+  EXPECT_EQ(got, kMessages);
 }
 
 TEST_P(Transports, WhatIsSentBeforeTheMeetingArrives) {

@@ -134,12 +134,12 @@ std::map<Step, Ledger::Row> without_worlds(std::map<Step, Ledger::Row> rows) {
   return rows;
 }
 
-constexpr Step kSteps = 60;
+constexpr Step kSteps = 150;
 
 TEST(DaemonThreads, SeveralWorldsGiveTheBitsOfOne) {
   const Scene scene = generate("heap", 200, 1);
   const RunResult one = run(scene, 1, kSteps, 0, 0);
-  for (const WorldId worlds : {2u, 4u}) {
+  for (const WorldId worlds : {2u, 4u, 6u}) {
     const RunResult several = run(scene, worlds, kSteps, 0, 0);
     EXPECT_EQ(without_worlds(several.rows), without_worlds(one.rows)) << worlds << " worlds";
     EXPECT_GT(several.mixed_islands, 0u);
