@@ -185,8 +185,9 @@ unset multiplot
 
 void step(const Options& options, Headline& headline) {
   const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 3;
-  Csv table(options, "step", "scene,bodies,bullet_ms,soda_ms,boxes_ms,broad_ms,narrow_ms,islands_ms,order_ms,solve_ms,"
-                             "stacks,standing,standing_bullet,drift_m,drift_bullet_m,sink_m,sink_bullet_m");
+  Csv table(options, "step",
+            "scene,bodies,bullet_ms,soda_ms,boxes_ms,broad_ms,narrow_ms,islands_ms,order_ms,solve_ms,"
+            "stacks,standing,standing_bullet,drift_m,drift_bullet_m,sink_m,sink_bullet_m");
   Csv course(options, "step_course", "scene,seconds,soda_ms,bullet_ms");
   for (SceneCase c : kScenes) {
     if (options.quick) c.bodies /= 4, c.stacked /= 4;
@@ -195,8 +196,7 @@ void step(const Options& options, Headline& headline) {
     const int blocks = static_cast<int>(std::lround((options.quick ? 2 : kSeconds) / scene.dt)) / kBlock;
     Measured m;
     BodySet last;
-    for (int round = 0; round < rounds; ++round)
-      measure_round(scene, c, blocks, round % 2 == 0, rounds, m, last);
+    for (int round = 0; round < rounds; ++round) measure_round(scene, c, blocks, round % 2 == 0, rounds, m, last);
     // Both runs are deterministic, so a block does the same work in every round.
     double ours = 0, bullet = 0;
     for (int b = 0; b < blocks; ++b) {

@@ -73,7 +73,8 @@ void worlds(const Options& options, Headline& headline) {
   const auto folder = std::filesystem::temp_directory_path() / ("soda-bench-" + std::to_string(getpid()));
   std::filesystem::create_directories(folder);
   const auto scene_file = folder / "bench.scene", stats = folder / "stats.json";
-  Csv table(options, "worlds", "scene,run,steps_per_second,cpu_seconds,over_one_world,waiting_share,mixed_islands_per_step");
+  Csv table(options, "worlds",
+            "scene,run,steps_per_second,cpu_seconds,over_one_world,waiting_share,mixed_islands_per_step");
   for (const Case& c : kCases) {
     Scene scene = generate(c.scene, c.bodies, 1);
     scene.sleeping = false;  // else the scenes soon cost nothing

@@ -1,4 +1,5 @@
-// Some bodies at one step with the contact records that belong to them: the unit in which state is kept, sent and saved.
+// Some bodies at one step with the contact records that belong to them: the unit in which state is kept, sent and
+// saved.
 #pragma once
 
 #include <vector>

@@ -28,8 +28,8 @@ struct ContactRecord {
   double offset[3] = {0, 0, 0};            // m, from a's centre of mass to b's, when the points were detected
   double orientation_a[4] = {0, 0, 0, 1};  // of a, when detected: x, y, z, w
   double orientation_b[4] = {0, 0, 0, 1};
-  double friction[3] = {0, 0, 0};          // N s, friction impulse on b
-  double twist = 0;                        // N m s, friction about the normal
+  double friction[3] = {0, 0, 0};               // N s, friction impulse on b
+  double twist = 0;                             // N m s, friction about the normal
   ContactPoint points[kMaxContactPoints] = {};  // the first `count` are in use, the others all zero
 
   bool with_static() const { return (b & kStaticBit) != 0; }

@@ -60,7 +60,7 @@ double largest_ordinary_radius(std::vector<double> radii) {
 Cell Grid::cell_of(const Vec3& position) const {
   Cell c;
   for (int axis = 0; axis < 3; ++axis) {
-    const double f = std::floor((position[axis] - origin[axis]) / edge);
+    const double f = (position[axis] - origin[axis]) / edge;
     // Not `f < 0` alone: a NaN must end in a cell, too.
     c[axis] = !(f > 0) ? 0 : f >= size[axis] ? size[axis] - 1 : static_cast<std::int32_t>(f);
   }

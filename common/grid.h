@@ -1,5 +1,5 @@
-// The territory grid: a uniform grid of cubes that covers the scene's bodies at the start. Whatever leaves it belongs to
-// the nearest cell.
+// The territory grid: a uniform grid of cubes that covers the scene's bodies at the start. Whatever leaves it belongs
+// to the nearest cell.
 #pragma once
 
 #include <array>
@@ -14,14 +14,12 @@ namespace soda {
 using Cell = std::array<std::int32_t, 3>;
 
 struct Grid {
-  Vec3 origin = Vec3::Zero();              // m, lower corner of cell (0, 0, 0)
-  double edge = 1;                         // m
+  Vec3 origin = Vec3::Zero();                 // m, lower corner of cell (0, 0, 0)
+  double edge = 1;                            // m
   std::array<std::int32_t, 3> size{1, 1, 1};  // cells along each axis
 
   Cell cell_of(const Vec3& position) const;  // clamped to the grid
-  std::size_t index(const Cell& c) const {
-    return (static_cast<std::size_t>(c[2]) * size[1] + c[1]) * size[0] + c[0];
-  }
+  std::size_t index(const Cell& c) const { return (static_cast<std::size_t>(c[2]) * size[1] + c[1]) * size[0] + c[0]; }
   std::size_t cells() const { return static_cast<std::size_t>(size[0]) * size[1] * size[2]; }
 };
 

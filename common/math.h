@@ -1,4 +1,5 @@
-// Eigen's vector types under the names used everywhere in SODA, and the transcendental functions that may reach a state.
+// Eigen's vector types under the names used everywhere in SODA, and the transcendental functions that may reach a
+// state.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +12,7 @@ using Mat3 = Eigen::Matrix3d;
 using Quat = Eigen::Quaterniond;
 
 struct Pose {
-  Vec3 position = Vec3::Zero();        // m
+  Vec3 position = Vec3::Zero();         // m
   Quat orientation = Quat::Identity();  // unit quaternion, body frame to parent frame
 };
 

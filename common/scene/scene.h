@@ -30,17 +30,17 @@ struct Cylinder {
 struct ConvexHull {
   std::vector<Vec3> points;  // m, at least 4, not in one plane
 };
-struct Plane {               // static only: the half space below is solid
+struct Plane {                  // static only: the half space below is solid
   Vec3 normal = Vec3::UnitZ();  // unit
 };
-struct TriangleMesh {  // static only
-  std::vector<Vec3> vertices;                          // m
+struct TriangleMesh {                                   // static only
+  std::vector<Vec3> vertices;                           // m
   std::vector<std::array<std::uint32_t, 3>> triangles;  // indices into vertices
 };
 struct HeightField {  // static only; sample (i, j) lies at ((i - (columns-1)/2) spacing_x, (j - (rows-1)/2) spacing_y)
-  std::uint32_t columns = 0, rows = 0;     // at least 2 each
-  double spacing_x = 0, spacing_y = 0;     // m
-  std::vector<double> heights;             // m, row by row (j outer), columns * rows values
+  std::uint32_t columns = 0, rows = 0;  // at least 2 each
+  double spacing_x = 0, spacing_y = 0;  // m
+  std::vector<double> heights;          // m, row by row (j outer), columns * rows values
 };
 using Geometry = std::variant<Sphere, Box, Capsule, Cylinder, ConvexHull, Plane, TriangleMesh, HeightField>;
 
@@ -51,9 +51,9 @@ struct Shape {
 
 // ---- bodies ---------------------------------------------------------------------------------------------------------
 struct Inertial {
-  double mass = 0;               // kg
-  Vec3 centre = Vec3::Zero();    // m, centre of mass in the body's frame
-  Mat3 inertia = Mat3::Zero();   // kg m^2 about the centre of mass, in the body's axes; symmetric, positive definite
+  double mass = 0;              // kg
+  Vec3 centre = Vec3::Zero();   // m, centre of mass in the body's frame
+  Mat3 inertia = Mat3::Zero();  // kg m^2 about the centre of mass, in the body's axes; symmetric, positive definite
 };
 
 // Makes crowds and conveyors: accelerates a body towards a target velocity, within bounds at which it turns round.
@@ -70,7 +70,7 @@ struct Body {
   BodyId id = 0;
   std::string name;  // may be empty; for messages
   bool is_static = false;
-  Pose pose;  // of the body's frame, in the world
+  Pose pose;                             // of the body's frame, in the world
   Vec3 linear_velocity = Vec3::Zero();   // m/s, of the centre of mass
   Vec3 angular_velocity = Vec3::Zero();  // rad/s, world frame
   std::vector<Shape> shapes;             // at least one; several are a compound

@@ -174,7 +174,8 @@ void encode_set(const BodySet& set, std::vector<std::byte>& out) {
   put(out, static_cast<std::uint32_t>(set.bodies.size()));
   put(out, static_cast<std::uint32_t>(set.contacts.size()));
   put_bytes(out, set.bodies.data(), set.bodies.size() * sizeof(BodyState));
-  for (const ContactRecord& record : set.contacts) put_bytes(out, &record, kRecordHead + record.count * sizeof(ContactPoint));
+  for (const ContactRecord& record : set.contacts)
+    put_bytes(out, &record, kRecordHead + record.count * sizeof(ContactPoint));
 }
 
 BodySet decode_set(std::span<const std::byte>& bytes, const physics::Model& model) {

@@ -51,13 +51,13 @@ class Link {
 
   Message next_;
   Step told_upto_ = -1, told_final_ = -1;
-  std::uint64_t sent_ = 0;                     // newest number sent
-  std::deque<std::vector<std::byte>> log_;     // messages sent_ - log_.size() + 1 .. sent_
+  std::uint64_t sent_ = 0;                  // newest number sent
+  std::deque<std::vector<std::byte>> log_;  // messages sent_ - log_.size() + 1 .. sent_
   bool repeat_ = false, ask_ = false;
 
-  std::uint64_t received_ = 0;                 // everything up to this number has been delivered
+  std::uint64_t received_ = 0;                     // everything up to this number has been delivered
   std::uint64_t asked_after_ = ~std::uint64_t{0};  // the gap after this number has been asked for already
-  std::map<std::uint64_t, Message> early_;     // beyond a gap
+  std::map<std::uint64_t, Message> early_;         // beyond a gap
   Step upto_ = -1, final_ = -1;
   std::uint64_t duplicates_ = 0, resent_ = 0;
 };

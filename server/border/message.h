@@ -13,8 +13,8 @@ struct Revision {
   std::uint32_t epoch = 0, count = 0;
 };
 
-// The bodies that the sender produced at a step and that the receiver owns then (arrivals) or has near. Left out where it
-// would say just what the receiver assumes without it: the sleeping bodies of the step before.
+// The bodies that the sender produced at a step and that the receiver owns then (arrivals) or has near. Left out where
+// it would say just what the receiver assumes without it: the sleeping bodies of the step before.
 struct Frame {
   Step step = 0;
   Revision revision;

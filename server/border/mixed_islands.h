@@ -32,9 +32,9 @@ class MixedIslands {
     bool operator<(const Key& o) const { return origin != o.origin ? origin < o.origin : component < o.component; }
   };
   struct Closure {
-    std::vector<Key> components;     // reached so far, ascending
-    std::vector<WorldId> worlds;     // whose parts were used, ascending
-    std::vector<WorldId> missing;    // whose parts are still needed; empty: closed
+    std::vector<Key> components;   // reached so far, ascending
+    std::vector<WorldId> worlds;   // whose parts were used, ascending
+    std::vector<WorldId> missing;  // whose parts are still needed; empty: closed
   };
 
   void clear() { parts_.clear(); }

@@ -8,8 +8,8 @@
 
 namespace soda::border {
 
-// Turns a set at t - 1 into what is assumed of it at t if nothing is told: its sleeping bodies stay as they are, everything
-// awake is gone.
+// Turns a set at t - 1 into what is assumed of it at t if nothing is told: its sleeping bodies stay as they are,
+// everything awake is gone.
 void keep_sleepers(BodySet& set);
 
 // Bit for bit.

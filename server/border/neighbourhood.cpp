@@ -20,10 +20,15 @@ double largest_reach(const physics::Model& model) {
 }  // namespace
 
 Neighbourhood::Neighbourhood(const physics::Model& model, const TerritoryMap& map, WorldId me)
-    : model_(model), map_(map), me_(me) {
+    : model_(model), map_(map), me_(me), half_edge_(0.5 * map.grid.edge) {
   const Grid& grid = map.grid;
   // From a cell of the owner at t: one cell that the body may travel, its reach, and half a cell.
   const int range = std::max(2, static_cast<int>(std::ceil(largest_reach(model) / grid.edge + 0.5)) + 1);
+
+  for (const physics::BodyModel& m : model.bodies()) {
+    const double room = (half_edge_ - 2 * m.radius - physics::kContactMargin) / model.scene().dt;
+    ordinary_below_.push_back(room > 0 ? room * room : -1);
+  }
 
   // Cells near ours, axis by axis: dilating along each axis in turn gives the cube.
   std::vector<std::uint8_t> near(grid.cells(), 0);
@@ -62,17 +67,18 @@ Neighbourhood::Neighbourhood(const physics::Model& model, const TerritoryMap& ma
       }
 }
 
-bool Neighbourhood::surely_ordinary(const BodyState& body, const physics::BodyModel& m) const {
-  const double dt = model_.scene().dt;
-  return m.radius * (1 + std::min(1.0, body.w().norm() * dt)) + body.v().norm() * dt + physics::kContactMargin <=
-         0.5 * map_.grid.edge;
-}
-
-bool Neighbourhood::is_wide(const BodyState& body) const {
-  if (surely_ordinary(body, *model_.find(body.id))) return false;
-  const Aabb box = physics::reach_box(body, model_);
-  const Vec3 x = body.x();
-  return (box.max - x).maxCoeff() > 0.5 * map_.grid.edge || (x - box.min).maxCoeff() > 0.5 * map_.grid.edge;
+Neighbourhood::Place Neighbourhood::place(const BodyState& body) const {
+  const std::size_t cell = map_.grid.index(map_.grid.cell_of(body.x()));
+  Place place;
+  place.owner = map_.owner[cell];
+  const auto index = static_cast<std::size_t>(model_.find(body.id) - model_.bodies().data());
+  if (!(body.v().squaredNorm() <= ordinary_below_[index])) {
+    const Aabb box = physics::reach_box(body, model_);
+    const Vec3 x = body.x();
+    place.wide = (box.max - x).maxCoeff() > half_edge_ || (x - box.min).maxCoeff() > half_edge_;
+  }
+  place.inside = !place.wide && sole_[cell] != kNoWorld;
+  return place;
 }
 
 void Neighbourhood::reached_by_box(const BodyState& body, std::vector<WorldId>& worlds) const {
@@ -97,10 +103,7 @@ void Neighbourhood::reached(const BodyState& body, std::vector<WorldId>& worlds)
 
 void Neighbourhood::hearers(const BodyState& body, std::vector<WorldId>& worlds) const {
   worlds.clear();
-  const std::size_t cell = map_.grid.index(map_.grid.cell_of(body.x()));
-  const bool ordinary = surely_ordinary(body, *model_.find(body.id));
-  if (ordinary && sole_[cell] == me_) return;  // the usual case: deep inside
-  worlds.push_back(map_.owner[cell]);
+  worlds.push_back(owner(body));
   reached_by_box(body, worlds);
   std::erase(worlds, me_);
   std::sort(worlds.begin(), worlds.end());

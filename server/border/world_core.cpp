@@ -48,7 +48,8 @@ class WorldCore::Impl {
         neighbourhood_(model, map, settings.me),
         stepper_(model),
         mixed_(neighbourhood_) {
-    for (const WorldId n : neighbourhood_.neighbours()) links_.emplace_back(settings.session, settings.me, settings.epoch, n);
+    for (const WorldId n : neighbourhood_.neighbours())
+      links_.emplace_back(settings.session, settings.me, settings.epoch, n);
     heard_.resize(links_.size());
     told_.resize(links_.size());
     BodySet own;
@@ -62,7 +63,8 @@ class WorldCore::Impl {
     try {
       Message message = decode(bytes, model_);
       const Header& h = message.header;
-      if (h.session != settings_.session) throw CodecError("border message of another session (scene, worlds or steps differ)");
+      if (h.session != settings_.session)
+        throw CodecError("border message of another session (scene, worlds or steps differ)");
       if (h.to != settings_.me) throw CodecError("border message for world " + std::to_string(h.to));
       Link* link = link_to(h.from);
       if (!link) throw CodecError("border message from world " + std::to_string(h.from) + ", which is no neighbour");
@@ -115,7 +117,8 @@ class WorldCore::Impl {
     std::set<WorldId> worlds;
     if (stage_ == Stage::kGather || clock_ == settings_.last_step) {
       for (const Link& link : links_)
-        if (clock_ == settings_.last_step ? link.final_step() < clock_ : link.upto() < clock_) worlds.insert(link.peer());
+        if (clock_ == settings_.last_step ? link.final_step() < clock_ : link.upto() < clock_)
+          worlds.insert(link.peer());
     } else {
       // Whoever's part is missing may have it from somebody else: all neighbours are asked.
       if (!open_.empty())
@@ -143,7 +146,8 @@ class WorldCore::Impl {
     return nullptr;
   }
 
-  // ---- what comes in -------------------------------------------------------------------------------------------------
+  // ---- what comes in
+  // -------------------------------------------------------------------------------------------------
   void deliver(const Link& link, Message& message) {
     const auto index = static_cast<std::size_t>(&link - links_.data());
     const Step upto = message.header.upto;
@@ -162,7 +166,8 @@ class WorldCore::Impl {
     }
   }
 
-  // ---- the step ------------------------------------------------------------------------------------------------------
+  // ---- the step
+  // ------------------------------------------------------------------------------------------------------
   Progress advance() {
     switch (stage_) {
       case Stage::kGather:
@@ -224,13 +229,18 @@ class WorldCore::Impl {
     std::vector<std::uint8_t> wide_own(n, 0);
     std::vector<WorldId> worlds;
     own_bodies_ = 0;
-    for (std::size_t i = 0; i < n; ++i) {
+    const std::vector<BodyState>& produced = states_.back().set.bodies;
+    for (std::size_t i = 0, p = 0; i < n; ++i) {
       const BodyState& body = known_.bodies[i];
-      const WorldId owner = neighbourhood_.owner(body);
+      const bool ours = p < produced.size() && produced[p].id == body.id;
+      const auto [owner, wide, inside] = links_.empty() ? Neighbourhood::Place{settings_.me}
+                                         : ours         ? places_[p]
+                                                        : neighbourhood_.place(body);
+      p += ours;
       own_[i] = owner == settings_.me;
       own_bodies_ += own_[i];
       roles_[i] = own_[i] ? physics::kRoleWanted : physics::kRoleNone;
-      if (links_.empty() || !neighbourhood_.is_wide(body)) continue;
+      if (!wide) continue;
       roles_[i] |= physics::kRoleWide;
       neighbourhood_.reached(body, worlds);
       if (own_[i]) {
@@ -243,7 +253,7 @@ class WorldCore::Impl {
       }
     }
     const physics::Stepper::Records previous[] = {states_.back().set.contacts, heard_now_.contacts};
-    stepper_.find_contacts(known_.bodies, previous, roles_, known_.contacts);
+    own_contacts_ = stepper_.find_contacts(known_.bodies, previous, roles_, known_.contacts);
     stepper_.find_islands(known_.bodies, known_.contacts, ends_, islands_);
 
     // Islands of our own alone, and components of islands that others share.
@@ -273,6 +283,7 @@ class WorldCore::Impl {
         }
       }
       for (const std::uint32_t c : islands_.contacts_of(k)) component.set.contacts.push_back(known_.contacts[c]);
+      std::sort(component.set.contacts.begin(), component.set.contacts.end(), record_before);
       part.components.push_back(std::move(component));
     }
     // Every part of a step goes out before any is waited for.
@@ -348,8 +359,9 @@ class WorldCore::Impl {
     stats_.mixed_islands += ours && others;
     for (const ContactRecord& record : island.contacts) {
       if (!std::binary_search(own_ids.begin(), own_ids.end(), record.a)) continue;
-      const auto at = std::lower_bound(known_.contacts.begin(), known_.contacts.end(), record, record_before);
-      if (at != known_.contacts.end() && !record_before(record, *at))
+      const auto end = known_.contacts.begin() + static_cast<std::ptrdiff_t>(own_contacts_);
+      const auto at = std::lower_bound(known_.contacts.begin(), end, record, record_before);
+      if (at != end && !record_before(record, *at))
         *at = record;
       else
         unknown_contacts_.push_back(record);  // of an own wide body with one that is not near here
@@ -364,7 +376,7 @@ class WorldCore::Impl {
     next.bodies.swap(known_.bodies);
     next.contacts.swap(known_.contacts);
     if (!links_.empty()) {
-      keep(next.contacts, [&](std::size_t c) { return own_[ends_[c].a] != 0; });
+      next.contacts.resize(own_contacts_);
       keep(next.bodies, [&](std::size_t i) { return own_[i] != 0; });
       if (!unknown_contacts_.empty()) {
         next.contacts.insert(next.contacts.end(), unknown_contacts_.begin(), unknown_contacts_.end());
@@ -396,18 +408,35 @@ class WorldCore::Impl {
     tell(state);
   }
 
+  // Of a body that stays here others need the records with bodies that may be theirs, and of two wide bodies, which
+  // whom they reach looks at too; those with its own kind and with the ground matter here alone.
+  bool concerns_others(const BodySet& produced, const ContactRecord& record, bool wide) const {
+    if (record.with_static()) return false;
+    const auto at = std::lower_bound(produced.bodies.begin(), produced.bodies.end(), record.b,
+                                     [](const BodyState& b, BodyId id) { return b.id < id; });
+    if (at == produced.bodies.end() || at->id != record.b) return true;
+    const Neighbourhood::Place& partner = places_[static_cast<std::size_t>(at - produced.bodies.begin())];
+    return partner.owner != settings_.me || (wide && partner.wide);
+  }
+
   void tell(const BodySet& state) {
     std::vector<BodySet> sets(links_.size());
-    for (const BodyState& body : state.bodies) {
+    places_.resize(state.bodies.size());
+    for (std::size_t i = 0; i < state.bodies.size(); ++i) places_[i] = neighbourhood_.place(state.bodies[i]);
+    for (std::size_t i = 0; i < state.bodies.size(); ++i) {
+      const BodyState& body = state.bodies[i];
+      if (places_[i].inside && places_[i].owner == settings_.me) continue;
       neighbourhood_.hearers(body, hearers_);
       if (hearers_.empty()) continue;
       const auto records = std::equal_range(state.contacts.begin(), state.contacts.end(), ContactRecord{.a = body.id},
                                             [](const ContactRecord& l, const ContactRecord& r) { return l.a < r.a; });
-      if (neighbourhood_.owner(body) != settings_.me) ++stats_.departed;
+      if (places_[i].owner != settings_.me) ++stats_.departed;
       for (std::size_t l = 0; l < links_.size(); ++l) {
         if (!std::binary_search(hearers_.begin(), hearers_.end(), links_[l].peer())) continue;
         sets[l].bodies.push_back(body);
-        sets[l].contacts.insert(sets[l].contacts.end(), records.first, records.second);
+        std::copy_if(records.first, records.second, std::back_inserter(sets[l].contacts), [&](const ContactRecord& c) {
+          return places_[i].owner != settings_.me || concerns_others(state, c, places_[i].wide);
+        });
       }
     }
     for (std::size_t l = 0; l < links_.size(); ++l) {
@@ -418,9 +447,10 @@ class WorldCore::Impl {
     }
   }
 
-  // ---- finality ------------------------------------------------------------------------------------------------------
-  // State 0 is the scene. State t + 1 is final when it is computed, t is final, and so it is with every neighbour: then
-  // all that the step was computed from was final.
+  // ---- finality
+  // ------------------------------------------------------------------------------------------------------ State 0 is
+  // the scene. State t + 1 is final when it is computed, t is final, and so it is with every neighbour: then all that
+  // the step was computed from was final.
   void finalise() {
     while (final_ < clock_ && (final_ < 0 || std::all_of(links_.begin(), links_.end(), [&](const Link& link) {
                                  return link.final_step() >= final_;
@@ -467,6 +497,8 @@ class WorldCore::Impl {
   // The step at hand.
   BodySet heard_now_;  // from others
   BodySet known_;      // together with what was produced here; contacts as found at the clock; advanced in place
+  std::size_t own_contacts_ = 0;              // the first so many of known_.contacts belong to own bodies
+  std::vector<Neighbourhood::Place> places_;  // of the bodies of states_.back()
   std::vector<std::uint8_t> own_, roles_;
   std::vector<physics::Ends> ends_, mixed_ends_;
   physics::Islands islands_, mixed_islands_;

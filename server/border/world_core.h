@@ -22,26 +22,27 @@ namespace soda::border {
 
 struct CoreSettings {
   WorldId me = 0;
-  std::uint32_t epoch = 0;    // of this start of the world
-  std::uint64_t session = 0;  // what all worlds of a session have in common (a hash of scene and settings); others' messages are refused
-  Step last_step = 0;       // the run ends when this step is final
+  std::uint32_t epoch = 0;  // of this start of the world
+  std::uint64_t session =
+      0;  // what all worlds of a session have in common (a hash of scene and settings); others' messages are refused
+  Step last_step = 0;  // the run ends when this step is final
 };
 
 struct CoreStats {
-  std::uint64_t steps = 0;           // steps computed
-  std::uint64_t syncs = 0;           // steps for which island parts were exchanged
-  std::uint64_t mixed_islands = 0;   // islands solved together with other worlds, summed over steps
-  std::uint64_t arrived = 0;         // bodies that came into the territory
-  std::uint64_t departed = 0;        // bodies that left it
-  std::uint64_t wide_bodies = 0;     // bodies sent as wide, summed over steps
+  std::uint64_t steps = 0;          // steps computed
+  std::uint64_t syncs = 0;          // steps for which island parts were exchanged
+  std::uint64_t mixed_islands = 0;  // islands solved together with other worlds, summed over steps
+  std::uint64_t arrived = 0;        // bodies that came into the territory
+  std::uint64_t departed = 0;       // bodies that left it
+  std::uint64_t wide_bodies = 0;    // bodies sent as wide, summed over steps
   std::uint64_t messages_sent = 0, bytes_sent = 0;
   std::uint64_t frames_sent = 0, frame_bodies_sent = 0;  // frames that held bodies, and how many
-  std::uint64_t parts_sent = 0;      // own parts and parts passed on
+  std::uint64_t parts_sent = 0;                          // own parts and parts passed on
   std::uint64_t messages_resent = 0;
-  std::uint64_t duplicates = 0;      // messages received again, ignored
-  std::uint64_t refused = 0;         // malformed or foreign messages, and protocol errors
-  std::uint64_t clamped = 0;         // bodies slowed to the scene's largest speed, summed over steps
-  std::uint64_t non_finite = 0;      // bodies whose result was not finite and which were held, summed over steps
+  std::uint64_t duplicates = 0;  // messages received again, ignored
+  std::uint64_t refused = 0;     // malformed or foreign messages, and protocol errors
+  std::uint64_t clamped = 0;     // bodies slowed to the scene's largest speed, summed over steps
+  std::uint64_t non_finite = 0;  // bodies whose result was not finite and which were held, summed over steps
 };
 
 // Told what a world computes. All calls come from within WorldCore::work or receive, on the caller's thread.
@@ -69,14 +70,15 @@ enum class Progress {
 
 class WorldCore {
  public:
-  // `model`, `map` and `observer` must outlive the core. The bodies of state 0 are the scene's whose centres of mass lie
-  // in this world's territory.
+  // `model`, `map` and `observer` must outlive the core. The bodies of state 0 are the scene's whose centres of mass
+  // lie in this world's territory.
   WorldCore(const physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer);
   ~WorldCore();
 
   // ---- in
-  // A message as it came, from whichever neighbour, in any order, any number of times. False: it was refused (malformed,
-  // not for this world or epoch, or contrary to the protocol); last_refusal() says why, and nothing has changed.
+  // A message as it came, from whichever neighbour, in any order, any number of times. False: it was refused
+  // (malformed, not for this world or epoch, or contrary to the protocol); last_refusal() says why, and nothing has
+  // changed.
   bool receive(std::span<const std::byte> message);
   const std::string& last_refusal() const;
   // The connection with that neighbour was interrupted, or nothing has come for long: asks it for what is missing here

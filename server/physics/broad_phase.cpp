@@ -101,7 +101,8 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
       for (std::int32_t z = entry.z - 1; z <= entry.z + 1; ++z)
         for (std::int32_t y = entry.y - 1; y <= entry.y + 1; ++y)
           for (std::int32_t x = entry.x - 1; x <= entry.x + 1; ++x)
-            scan(entry, x, y, z, 0, [&](std::uint32_t o, const Entry& other) { return o == e || (o < e && awake(other)); });
+            scan(entry, x, y, z, 0,
+                 [&](std::uint32_t o, const Entry& other) { return o == e || (o < e && awake(other)); });
     }
   } else {
     // Half of the neighbourhood: the own cell (later entries), the next in the row, and four rows of three.

@@ -12,7 +12,7 @@ namespace soda::physics {
 
 // Partners of each body, higher index only, ascending: CSR. Indices are positions in the arrays given.
 struct Pairs {
-  std::vector<std::uint32_t> offsets;   // bodies + 1
+  std::vector<std::uint32_t> offsets;  // bodies + 1
   std::vector<std::uint32_t> partners;
   std::span<const std::uint32_t> of(std::size_t body) const {
     return std::span(partners).subspan(offsets[body], offsets[body + 1] - offsets[body]);

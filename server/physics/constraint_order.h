@@ -2,10 +2,11 @@
 // never on which process solves, nor on what else is in the scene.
 //
 // Four grids of blocks, each shifted against the one before by a quarter of a block along all axes. A pair belongs to
-// the first grid one of whose blocks holds both bodies' centres at the start of the step, or else to a last phase; a pair
-// with a static body goes by its dynamic body alone. Order: grid, block, colour, lower id, higher id, part. The colours
-// are greedy within the block: constraints of one colour share no body, which lets errors cancel instead of run through
-// a stack in one direction, and keeps the place for solving four of them at once. Blocks of one grid share no body.
+// the first grid one of whose blocks holds both bodies' centres at the start of the step, or else to a last phase; a
+// pair with a static body goes by its dynamic body alone. Order: grid, block, colour, lower id, higher id, part. The
+// colours are greedy within the block: constraints of one colour share no body, which lets errors cancel instead of run
+// through a stack in one direction, and keeps the place for solving four of them at once. Blocks of one grid share no
+// body.
 #pragma once
 
 #include <cstdint>

@@ -25,7 +25,8 @@ Vec3 drive_target(const Drive& drive, const Vec3& x, std::uint32_t& flags) {
   for (int axis = 0; axis < 3; ++axis) {
     const std::uint32_t bit = kDriveReversed << axis;
     double t = flags & bit ? -target[axis] : target[axis];
-    if (drive.bounds && ((x[axis] > drive.bounds->max[axis] && t > 0) || (x[axis] < drive.bounds->min[axis] && t < 0))) {
+    if (drive.bounds &&
+        ((x[axis] > drive.bounds->max[axis] && t > 0) || (x[axis] < drive.bounds->min[axis] && t < 0))) {
       flags ^= bit;
       t = -t;
     }
@@ -88,8 +89,8 @@ void move(MovingBody& body, double h, const StepConstants& constants) {
     return;
   }
   // Angular momentum L is kept in the world frame. The implicit midpoint rule on the rotation group: the turn over h is
-  // that of w = I(q_half)^-1 L, where q_half = exp(w h / 2) q. Symmetric in time, so that energy does not drift; a fixed
-  // number of iterations, so that it is a pure function.
+  // that of w = I(q_half)^-1 L, where q_half = exp(w h / 2) q. Symmetric in time, so that energy does not drift; a
+  // fixed number of iterations, so that it is a pure function.
   const Mat3& inertia = body.model->inertia;
   const auto spin_at = [&](const Quat& q, const Vec3& momentum) -> Vec3 {
     return q * (body.model->inverse_inertia * (q.conjugate() * momentum));

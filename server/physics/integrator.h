@@ -1,5 +1,5 @@
-// Moving bodies through time: gravity, drives, damping, rotation. The quaternion is the state; a rotation matrix is only
-// ever made from it.
+// Moving bodies through time: gravity, drives, damping, rotation. The quaternion is the state; a rotation matrix is
+// only ever made from it.
 #pragma once
 
 #include <cstdint>
@@ -12,25 +12,25 @@ namespace soda::physics {
 // What every island's step needs to know of the scene.
 struct StepConstants {
   explicit StepConstants(const Scene& scene);
-  double dt;              // s
+  double dt;  // s
   std::uint32_t substeps;
-  double h;               // s, one sub-step
-  Vec3 gravity;           // m/s^2
-  Vec3 up;                // unit, against gravity; zero without gravity
-  double max_speed;       // m/s
+  double h;          // s, one sub-step
+  Vec3 gravity;      // m/s^2
+  Vec3 up;           // unit, against gravity; zero without gravity
+  double max_speed;  // m/s
   bool sleeping;
   std::uint32_t quiet_steps_to_sleep;
 };
 
 // A body while it is being stepped.
 struct MovingBody {
-  Vec3 v, w;          // m/s, rad/s
+  Vec3 v, w;           // m/s, rad/s
   Vec3 moved, turned;  // m, rad: sums over the sub-steps so far
   double inverse_mass;
   Mat3 inverse_inertia;  // world frame, at the start of the step
-  Vec3 x;             // m, at the start of the step
-  Quat q;             // now
-  Mat3 rotation;      // at the start of the step
+  Vec3 x;                // m, at the start of the step
+  Quat q;                // now
+  Mat3 rotation;         // at the start of the step
   const BodyModel* model;
   Vec3 drive_target;  // m/s, with the axes turned round; meaningful where the model has a drive
   bool clamped;       // was faster than the scene's largest speed
@@ -45,7 +45,8 @@ void accelerate(MovingBody& body, double h, const StepConstants& constants);
 // x += v h, q = exp(w h) q; bodies whose inertia is not isotropic keep their angular momentum. Clamps to max_speed.
 void move(MovingBody& body, double h, const StepConstants& constants);
 
-// A body that touches nothing: exact ballistic flight over the whole step (without damping and drive), rotation as above.
+// A body that touches nothing: exact ballistic flight over the whole step (without damping and drive), rotation as
+// above.
 void fly(MovingBody& body, const StepConstants& constants);
 
 // Writes the result into `state`, with flags of the drive and the quiet counter; returns false where the result is not

@@ -16,15 +16,15 @@ namespace soda::physics {
 // scene's body frame.
 struct BodyModel {
   BodyId id = 0;
-  double mass = 0, inverse_mass = 0;             // kg, 1/kg
-  Mat3 inertia = Mat3::Zero();                   // kg m^2, about the centre of mass, body axes
-  Mat3 inverse_inertia = Mat3::Zero();           // 1/(kg m^2)
-  bool isotropic = false;                        // inertia is a multiple of the identity: no gyroscopic terms
+  double mass = 0, inverse_mass = 0;    // kg, 1/kg
+  Mat3 inertia = Mat3::Zero();          // kg m^2, about the centre of mass, body axes
+  Mat3 inverse_inertia = Mat3::Zero();  // 1/(kg m^2)
+  bool isotropic = false;               // inertia is a multiple of the identity: no gyroscopic terms
   double friction = 0, restitution = 0;
   double linear_damping = 0, angular_damping = 0;  // 1/s
   std::uint32_t first_child = 0, children = 0;     // range in ShapeStore::children
-  double radius = 0;         // m, of the sphere about the centre of mass that holds all shapes
-  double inner_extent = 0;   // m, smallest half extent of any child: the scale for recycling contacts
+  double radius = 0;                               // m, of the sphere about the centre of mass that holds all shapes
+  double inner_extent = 0;  // m, smallest half extent of any child: the scale for recycling contacts
   const Drive* drive = nullptr;
 };
 
@@ -48,7 +48,7 @@ class Model {
   // The dynamic body of that id, or null.
   const BodyModel* find(BodyId id) const;
   const StaticModel* find_static(BodyId id) const;
-  std::span<const BodyModel> bodies() const { return bodies_; }     // ascending by id
+  std::span<const BodyModel> bodies() const { return bodies_; }      // ascending by id
   std::span<const StaticModel> statics() const { return statics_; }  // ascending by id
   const ShapeStore& shapes() const { return shapes_; }
   BodySet initial_state() const;  // state 0 of all dynamic bodies

@@ -124,8 +124,8 @@ void IslandSolver::warm_start(std::span<MovingBody> island) {
   for (const Constraint& c : constraints_) {
     MovingBody& a = island[c.a];
     Vec3 impulse = c.slide_impulse[0] * c.tangent[0] + c.slide_impulse[1] * c.tangent[1];
-    Vec3 spin_a = c.slide_impulse[0] * c.slide[0].a_spin + c.slide_impulse[1] * c.slide[1].a_spin +
-                  c.twist_impulse * c.a_twist;
+    Vec3 spin_a =
+        c.slide_impulse[0] * c.slide[0].a_spin + c.slide_impulse[1] * c.slide[1].a_spin + c.twist_impulse * c.a_twist;
     for (std::uint32_t k = 0; k < c.count; ++k) {
       impulse += c.points[k].impulse * c.normal;
       spin_a += c.points[k].impulse * c.points[k].row.a_spin;
@@ -134,8 +134,8 @@ void IslandSolver::warm_start(std::span<MovingBody> island) {
     a.w -= spin_a;
     if (c.b == kStaticSlot) continue;
     MovingBody& b = island[c.b];
-    Vec3 spin_b = c.slide_impulse[0] * c.slide[0].b_spin + c.slide_impulse[1] * c.slide[1].b_spin +
-                  c.twist_impulse * c.b_twist;
+    Vec3 spin_b =
+        c.slide_impulse[0] * c.slide[0].b_spin + c.slide_impulse[1] * c.slide[1].b_spin + c.twist_impulse * c.b_twist;
     for (std::uint32_t k = 0; k < c.count; ++k) spin_b += c.points[k].impulse * c.points[k].row.b_spin;
     b.v += c.inverse_mass_b * impulse;
     b.w += spin_b;

@@ -1,6 +1,6 @@
 // The island solver: TGS-soft, that is sub-steps with one pass over soft constraints each and one relaxing pass
-// (E. Catto, "Solver2D", 2024; sub-steps instead of iterations: Macklin et al., "Small Steps in Physics Simulation", SCA
-// 2019). Scalar, double precision.
+// (E. Catto, "Solver2D", 2024; sub-steps instead of iterations: Macklin et al., "Small Steps in Physics Simulation",
+// SCA 2019). Scalar, double precision.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ namespace soda::physics {
 
 // What a contact is made of besides its record.
 struct Surface {
-  double friction = 0, restitution = 0;     // of the pair
-  const StaticModel* fixed = nullptr;  // b, where it is static
+  double friction = 0, restitution = 0;  // of the pair
+  const StaticModel* fixed = nullptr;    // b, where it is static
 };
 
 class IslandSolver {
@@ -33,9 +33,9 @@ class IslandSolver {
              std::span<ContactRecord> records);
 
  private:
-  struct Row {  // one direction at one place
-    Vec3 a_turn, b_turn;        // r x direction, for each body: the angular Jacobian
-    Vec3 a_spin, b_spin;        // inverse inertia times that: change of angular velocity per unit of impulse
+  struct Row {            // one direction at one place
+    Vec3 a_turn, b_turn;  // r x direction, for each body: the angular Jacobian
+    Vec3 a_spin, b_spin;  // inverse inertia times that: change of angular velocity per unit of impulse
   };
   struct PointConstraint {
     Row row;

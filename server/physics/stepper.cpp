@@ -78,14 +78,19 @@ std::uint32_t Stepper::slot_of(BodyId id) const {
 
 Party Stepper::party(const BodyState& state, std::uint32_t slot) const {
   const BodyModel& m = *models_[slot];
-  return {state.id, state.x(), state.q(), rotations_[slot], model_.shapes().children(m.first_child, m.children),
+  return {state.id,       state.x(), state.q(), rotations_[slot], model_.shapes().children(m.first_child, m.children),
           m.inner_extent, m.radius};
 }
 
 Party Stepper::party(const StaticModel& fixed) const {
   // Only the dynamic body's size limits how long contacts are recycled.
-  return {kStaticBit | fixed.id, fixed.pose.position, fixed.pose.orientation, fixed.rotation,
-          model_.shapes().children(fixed.first_child, fixed.children), std::numeric_limits<double>::infinity(), 0};
+  return {kStaticBit | fixed.id,
+          fixed.pose.position,
+          fixed.pose.orientation,
+          fixed.rotation,
+          model_.shapes().children(fixed.first_child, fixed.children),
+          std::numeric_limits<double>::infinity(),
+          0};
 }
 
 void Stepper::place_bodies(std::span<const BodyState> bodies, std::span<const Records> previous,
@@ -115,21 +120,27 @@ void Stepper::place_bodies(std::span<const BodyState> bodies, std::span<const Re
     }
 }
 
-void Stepper::find_contacts(const BodySet& set, std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out) {
+std::size_t Stepper::find_contacts(const BodySet& set, std::span<const std::uint8_t> roles,
+                                   std::vector<ContactRecord>& out) {
   const Records previous = set.contacts;
-  find_contacts(set.bodies, std::span(&previous, 1), roles, out);
+  return find_contacts(set.bodies, std::span(&previous, 1), roles, out);
 }
 
-void Stepper::find_contacts(std::span<const BodyState> bodies, std::span<const Records> previous,
-                            std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out) {
+std::size_t Stepper::find_contacts(std::span<const BodyState> bodies, std::span<const Records> previous,
+                                   std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out) {
   out.clear();
   StageClock clock(timing);
   place_bodies(bodies, previous, roles);
   clock.lap(times.boxes);
   broad_.find(boxes_, roles_, broad_cell(model_), pairs_);
   clock.lap(times.broad);
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) contacts_of(bodies, i, out);
+  for (std::uint32_t i = 0; i < bodies.size(); ++i)
+    if (roles_[i] & kRoleWanted) contacts_of(bodies, i, out);
+  const std::size_t wanted = out.size();
+  for (std::uint32_t i = 0; i < bodies.size(); ++i)
+    if (!(roles_[i] & kRoleWanted)) contacts_of(bodies, i, out);
   clock.lap(times.narrow);
+  return wanted;
 }
 
 void Stepper::contacts_of(std::span<const BodyState> bodies, std::uint32_t body, std::vector<ContactRecord>& out) {
@@ -158,8 +169,7 @@ void Stepper::contacts_of(std::span<const BodyState> bodies, std::uint32_t body,
   for (const std::uint32_t partner : pairs_.of(body)) {
     const BodyState& other = bodies[partner];
     keep_sleeping_until(other.id);
-    const double approach =
-        (state.v() - other.v()).norm() + own_reach + other.w().norm() * models_[partner]->radius;
+    const double approach = (state.v() - other.v()).norm() + own_reach + other.w().norm() * models_[partner]->radius;
     updater_.update(self, party(other, partner), records_with(other.id),
                     kSpeculativeDistance + approach * constants_.dt, out);
   }

@@ -22,15 +22,15 @@
 
 namespace soda::physics {
 
-// Box that holds a body wherever it is within the coming step, contact margin and speculative reach included. A function
-// of its state alone. Two bodies whose boxes do not overlap do not touch in this step.
+// Box that holds a body wherever it is within the coming step, contact margin and speculative reach included. A
+// function of its state alone. Two bodies whose boxes do not overlap do not touch in this step.
 Aabb reach_box(const BodyState& state, const BodyModel& model, const Mat3& rotation, const Model& scene);
 Aabb reach_box(const BodyState& state, const Model& scene);
 
 struct StepCounters {
-  std::uint64_t clamped = 0;     // bodies slowed to the scene's largest speed
-  std::uint64_t non_finite = 0;  // bodies held because their result was not finite
-  std::uint64_t islands = 0;     // solved (asleep and free bodies not counted)
+  std::uint64_t clamped = 0;      // bodies slowed to the scene's largest speed
+  std::uint64_t non_finite = 0;   // bodies held because their result was not finite
+  std::uint64_t islands = 0;      // solved (asleep and free bodies not counted)
   std::uint64_t fell_asleep = 0;  // islands
 };
 
@@ -43,14 +43,15 @@ class Stepper {
  public:
   explicit Stepper(const Model& model);
 
-  // 1. The records at the poses of `bodies` (ascending by id) of all pairs that touch, in canonical order, into `out`.
-  // `previous` are the records of the step before, from one or several sources, each in canonical order and each with all
-  // the records of the bodies that it has any of. `roles` (BodyRole, one per body) say which pairs are wanted; kRoleAwake
-  // is filled in here. Without roles: all pairs.
+  // 1. The records at the poses of `bodies` (ascending by id) of all pairs that touch, into `out`: first those that
+  // belong to wanted bodies, in canonical order, then those of the others, likewise. Returns how many are the former.
+  // `previous` are the records of the step before, from one or several sources, each in canonical order and each with
+  // all the records of the bodies that it has any of. `roles` (BodyRole, one per body) say which pairs are wanted;
+  // kRoleAwake is filled in here. Without roles: all pairs.
   using Records = std::span<const ContactRecord>;
-  void find_contacts(std::span<const BodyState> bodies, std::span<const Records> previous,
-                     std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out);
-  void find_contacts(const BodySet& set, std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out);
+  std::size_t find_contacts(std::span<const BodyState> bodies, std::span<const Records> previous,
+                            std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out);
+  std::size_t find_contacts(const BodySet& set, std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out);
 
   // 2. Islands of `bodies` (ascending by id) under `contacts`; every body named by a record must be there.
   void find_islands(std::span<const BodyState> bodies, std::span<const ContactRecord> contacts, std::vector<Ends>& ends,

@@ -30,7 +30,7 @@ constexpr double kRestitutionThreshold = 1;   // m/s; slower approaches do not b
 
 // ---- integration
 constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning is taken as free of gyroscopic torque
-constexpr int kMidpointIterations = 4;  // each gains a factor of about (angle per sub-step x anisotropy)
+constexpr int kMidpointIterations = 4;     // each gains a factor of about (angle per sub-step x anisotropy)
 
 // ---- sleeping
 constexpr double kSleepSpeed = 0.05;  // m/s, of the centre of mass, and of the fastest point about it

@@ -67,7 +67,8 @@ std::vector<WorldId> slabs(const Scene& scene, WorldId worlds) {
   if (grid.size[0] < static_cast<std::int32_t>(worlds)) return {};
   std::vector<WorldId> owner(grid.cells());
   for (std::size_t i = 0; i < owner.size(); ++i)
-    owner[i] = static_cast<WorldId>(i % static_cast<std::size_t>(grid.size[0]) * worlds / static_cast<std::size_t>(grid.size[0]));
+    owner[i] = static_cast<WorldId>(i % static_cast<std::size_t>(grid.size[0]) * worlds /
+                                    static_cast<std::size_t>(grid.size[0]));
   return owner;
 }
 

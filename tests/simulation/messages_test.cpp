@@ -26,12 +26,21 @@ class Messages : public testing::Test {
     physics::Stepper stepper(model_);
     for (int t = 0; t < 120; ++t) stepper.step(set);
     EXPECT_GT(set.contacts.size(), 50u);
-    message_.header = {.session = 7, .from = 1, .to = 0, .epoch = 1, .to_epoch = 1, .sequence = 3, .ack = 2, .need = true,
-                       .upto = 120, .final_step = 119, .durable = 0};
+    message_.header = {.session = 7,
+                       .from = 1,
+                       .to = 0,
+                       .epoch = 1,
+                       .to_epoch = 1,
+                       .sequence = 3,
+                       .ack = 2,
+                       .need = true,
+                       .upto = 120,
+                       .final_step = 119,
+                       .durable = 0};
     message_.frames.push_back({120, {1, 0}, set});
     border::Component component{set, {{set.bodies[3].id, 2, 99}, {set.bodies[5].id, 0, 98}}};
-    message_.parts.push_back({.origin = 1, .step = 120, .through = 120, .revision = {1, 0}, .final = true,
-                              .components = {component, {}}});
+    message_.parts.push_back(
+        {.origin = 1, .step = 120, .through = 120, .revision = {1, 0}, .final = true, .components = {component, {}}});
   }
 
   physics::Model model_;
@@ -98,7 +107,8 @@ TEST_F(Messages, WithBadBodiesAreRefusedByName) {
   EXPECT_EQ(refusal([](BodySet& s) { s.bodies[2].flags = 1u << 20; }), "body " + third + ": unknown flags");
   EXPECT_EQ(refusal([](BodySet& s) { s.bodies[2].id = 999999; }), "body 999999: not in the scene");
   EXPECT_EQ(refusal([](BodySet& s) { std::swap(s.bodies[2], s.bodies[3]); }), "body " + third + ": out of order");
-  EXPECT_NE(refusal([](BodySet& s) { s.contacts[0].normal[0] = std::numeric_limits<double>::quiet_NaN(); }), "accepted");
+  EXPECT_NE(refusal([](BodySet& s) { s.contacts[0].normal[0] = std::numeric_limits<double>::quiet_NaN(); }),
+            "accepted");
   EXPECT_NE(refusal([](BodySet& s) { s.contacts[0].b = kStaticBit | 424242; }), "accepted");
 }
 

@@ -15,8 +15,8 @@ Scene cubes() { return generate("cubes", 150, 11); }
 Scene city() { return generate("city", 240, 2); }
 Scene cluster() { return generate("cluster", 108, 4); }
 
-// Sleeping boxes in a row across many cells, touching; one end is struck when all are asleep. The wave of waking crosses
-// every border at once, for an island wakes as a whole.
+// Sleeping boxes in a row across many cells, touching; one end is struck when all are asleep. The wave of waking
+// crosses every border at once, for an island wakes as a whole.
 Scene sleeping_chain() {
   SceneBuilder builder("sleeping chain");
   builder.add_ground(200);
@@ -27,8 +27,8 @@ Scene sleeping_chain() {
   return builder.finish();
 }
 
-// Planks three cells long and a slab over nine cells on small boxes in as many territories, and a box that comes down on
-// one end of a plank: those below the other end are known to the plank's owner only through others.
+// Planks three cells long and a slab over nine cells on small boxes in as many territories, and a box that comes down
+// on one end of a plank: those below the other end are known to the plank's owner only through others.
 Scene wide_bodies() {
   SceneBuilder builder("wide bodies");
   builder.scene.territory_cell = 1.7;
@@ -43,7 +43,8 @@ Scene wide_bodies() {
   return builder.finish();
 }
 
-// Bodies at 20 to 60 m/s through standing ones: reach boxes of many cells, and one cell and more travelled per few steps.
+// Bodies at 20 to 60 m/s through standing ones: reach boxes of many cells, and one cell and more travelled per few
+// steps.
 Scene fast_bodies() {
   SceneBuilder builder("fast bodies");
   builder.add_ground(300);
@@ -76,9 +77,15 @@ Scene corner() {
 
 const std::vector<HardScene>& hard_scenes() {
   static const std::vector<HardScene> scenes = {
-      {"piles", piles, 150, false},        {"heap", heap, 150, true},        {"cubes", cubes, 200, false},
-      {"city", city, 150, true},           {"cluster", cluster, 200, true},  {"sleeping_chain", sleeping_chain, 200, true},
-      {"wide_bodies", wide_bodies, 150, true}, {"fast_bodies", fast_bodies, 150, false}, {"corner", corner, 200, true},
+      {"piles", piles, 150, false},
+      {"heap", heap, 150, true},
+      {"cubes", cubes, 200, false},
+      {"city", city, 150, true},
+      {"cluster", cluster, 200, true},
+      {"sleeping_chain", sleeping_chain, 200, true},
+      {"wide_bodies", wide_bodies, 150, true},
+      {"fast_bodies", fast_bodies, 150, false},
+      {"corner", corner, 200, true},
   };
   return scenes;
 }

@@ -165,8 +165,7 @@ SessionResult run_session(const Scene& scene, WorldId worlds, Step steps, const 
 
 std::string first_difference(const std::vector<StepDigest>& expected, const std::vector<StepDigest>& got) {
   for (std::size_t t = 0; t < std::max(expected.size(), got.size()); ++t) {
-    if (t >= expected.size() || t >= got.size())
-      return "step " + std::to_string(t) + ": only one of the runs has it";
+    if (t >= expected.size() || t >= got.size()) return "step " + std::to_string(t) + ": only one of the runs has it";
     if (expected[t] == got[t]) continue;
     char text[160];
     std::snprintf(text, sizeof text, "step %zu: %zu bodies %016lx, expected %zu bodies %016lx", t, got[t].bodies,

@@ -178,7 +178,8 @@ TEST_P(Purity, RestoredAndRunAgain) {
 }
 
 TEST_P(Purity, WantedContactsAreThoseOfTheWhole) {
-  // With roles, the records found are those of the whole that touch a wanted body (between two wide ones: all).
+  // With roles, the records found are those of the whole that touch a wanted body (between two wide ones: all); those
+  // that belong to wanted bodies come first.
   Stepper stepper(model);
   Random random(9);
   std::vector<ContactRecord> whole, part;
@@ -189,21 +190,25 @@ TEST_P(Purity, WantedContactsAreThoseOfTheWhole) {
     for (std::uint8_t& r : roles)
       if (random.below(4) == 0) r |= kRoleWide;
     stepper.find_contacts(state, {}, whole);
-    stepper.find_contacts(state, roles, part);
+    const std::size_t of_wanted = stepper.find_contacts(state, roles, part);
     const auto role = [&](BodyId id) {
       const auto at = std::lower_bound(state.bodies.begin(), state.bodies.end(), id,
                                        [](const BodyState& b, BodyId i) { return b.id < i; });
       return roles[static_cast<std::size_t>(at - state.bodies.begin())];
     };
-    BodySet expected, got;
+    BodySet expected, of_others, got;
     got.contacts = part;
     for (const ContactRecord& c : whole) {
       const std::uint8_t a = role(c.a), b = c.with_static() ? std::uint8_t{kRoleNone} : role(c.b);
-      if (((a | b) & kRoleWanted) || (a & b & kRoleWide))
+      if (a & kRoleWanted)
         expected.contacts.push_back(c);
+      else if ((b & kRoleWanted) || (a & b & kRoleWide))
+        of_others.contacts.push_back(c);
       else
         ++left_out;
     }
+    ASSERT_EQ(of_wanted, expected.contacts.size());
+    expected.contacts.insert(expected.contacts.end(), of_others.contacts.begin(), of_others.contacts.end());
     const std::string difference = first_difference(expected, got);
     ASSERT_TRUE(difference.empty()) << GetParam().name << ", step " << t << ": " << difference;
     reference.step(state);
