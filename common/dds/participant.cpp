@@ -2,15 +2,22 @@
 
 #include <arpa/inet.h>
 #include <fastdds/rtps/attributes/ServerAttributes.h>
+#include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/utils/IPFinder.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <condition_variable>
+#include <cstring>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/log/Log.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
@@ -19,9 +26,19 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <filesystem>
+#include <iterator>
+#include <map>
 #include <mutex>
 #include <stdexcept>
+#include <stop_token>
+#include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
+#include <vector>
+
+#include "common/dds/shm_cleanup.h"
 
 namespace soda::dds {
 
@@ -32,7 +49,11 @@ using eprosima::fastrtps::types::ReturnCode_t;
 
 namespace {
 
-constexpr std::uint32_t kShmSegment = 16u << 20;   // bytes; by default 512 KiB, in which 1 MiB takes 12 ms, not 1.1 ms
+constexpr std::uint32_t kShmSegment = 16u << 20;  // bytes; by default 512 KiB, in which 1 MiB takes 12 ms, not 1.1 ms
+// ms. By default a port of shared memory whose reader did not move for a second is taken for dead, and what comes of
+// that when the reader had only been stopped may be a port that nobody hears. What the dead leave behind is found by
+// its locks.
+constexpr std::uint32_t kShmPatience = 3600 * 1000;
 constexpr std::uint32_t kSocketBuffer = 4u << 20;  // bytes
 constexpr double kAnnouncePeriod = 1;              // s, at most; how long two that lost each other take to meet again
 
@@ -64,6 +85,7 @@ void set_transports(const NetworkOptions& options, fdds::DomainParticipantQos& q
   if (options.shared_memory) {
     auto shm = std::make_shared<SharedMemTransportDescriptor>();
     shm->segment_size(kShmSegment);
+    shm->healthy_check_timeout_ms(kShmPatience);
     qos.transport().user_transports.push_back(shm);
   }
   auto udp = std::make_shared<UDPv4TransportDescriptor>();
@@ -78,6 +100,23 @@ void set_transports(const NetworkOptions& options, fdds::DomainParticipantQos& q
     udp->interfaceWhiteList.push_back(options.interface);
   }
   qos.transport().user_transports.push_back(udp);
+}
+
+// Where Fast DDS starts to look for free ports. By default every process starts at 0 and so takes over, in shared
+// memory, the port of one that was just killed; those that knew the dead one keep writing to its memory, which nobody
+// reads. So: an id whose ports have left no trace there, if there is one.
+int fresh_participant_id(int domain) {
+  constexpr int kIds = 110;  // the next domain's ports begin at 120
+  const int start = static_cast<int>(getpid() % kIds);
+  const auto taken = [&](int id) {
+    std::error_code error;  // where one cannot look, nothing is taken
+    for (const int port : {7410 + 250 * domain + 2 * id, 7411 + 250 * domain + 2 * id})
+      if (std::filesystem::exists("/dev/shm/fastrtps_port" + std::to_string(port), error)) return true;
+    return false;
+  };
+  for (int i = 0; i < kIds; ++i)
+    if (const int id = (start + i) % kIds; !taken(id)) return id;
+  return start;
 }
 
 void set_discovery(const NetworkOptions& options, fdds::DomainParticipantQos& qos) {
@@ -139,14 +178,37 @@ void guarded(const F& handler) {
 
 }  // namespace
 
-struct Participant::Impl {
+// Losing each other is not mutual: a process that others gave up (it stood still beyond its lease, say) may not have
+// given them up, and then Fast DDS 2.9 takes what it told them of its endpoints for acknowledged and may never repeat
+// it when they discover it again (seen in one of three pauses: no message comes through any more). So everybody
+// publishes, in the user data of its participant, whom it has given up, with a number that grows as long as it has met
+// that participant's endpoints not again; and who finds itself there with a new number announces all its endpoints
+// anew.
+struct Participant::Impl : fdds::DomainParticipantListener {
+  std::string session;
   fdds::DomainParticipant* participant = nullptr;
   fdds::Publisher* publisher = nullptr;
   fdds::Subscriber* subscriber = nullptr;
   std::mutex mutex;  // guards the creation of topics, which a writer and a reader may share
 
-  ~Impl() {
+  using Prefix = std::array<unsigned char, 12>;  // names a participant
+  std::mutex losses_mutex;
+  std::condition_variable_any losses_changed;
+  struct Loss {
+    std::uint32_t number = 0;
+    bool back = false, writer = false, reader = false;  // what of it was discovered again
+    bool healed() const { return writer && reader; }
+  };
+  std::map<Prefix, Loss> given_up;              // by this process
+  std::map<Prefix, std::uint32_t> given_up_by;  // this process by others: the number at its last announcement
+  bool tell_due = false, announce_due = false;
+  int announcements = 0;
+  std::jthread teller;  // DDS does not like to be asked for such things from its own callbacks
+
+  ~Impl() override {
+    teller = {};
     if (participant == nullptr) return;
+    participant->set_listener(nullptr);
     participant->delete_contained_entities();
     fdds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
@@ -160,16 +222,128 @@ struct Participant::Impl {
     if (made == nullptr) throw std::runtime_error("cannot make the DDS topic " + name);
     return made;
   }
+
+  static Prefix prefix_of(const frtps::GUID_t& guid) {
+    Prefix prefix;
+    std::copy_n(guid.guidPrefix.value, prefix.size(), prefix.begin());
+    return prefix;
+  }
+
+  void on_participant_discovery(fdds::DomainParticipant* self, frtps::ParticipantDiscoveryInfo&& info) override {
+    using Info = frtps::ParticipantDiscoveryInfo;
+    const Prefix who = prefix_of(info.info.m_guid);
+    const std::lock_guard lock(losses_mutex);
+    const auto loss = given_up.find(who);
+    if (info.status == Info::DROPPED_PARTICIPANT) {
+      if (given_up.size() >= kMostGivenUp && loss == given_up.end()) given_up.erase(given_up.begin());
+      given_up[who] = {given_up[who].number + 1, false, false, false};
+      tell_due = true;
+    } else if (info.status == Info::REMOVED_PARTICIPANT) {
+      given_up.erase(who);
+      given_up_by.erase(who);
+    } else {
+      if (loss != given_up.end()) loss->second.back = true;
+      const std::uint32_t number = number_of(self->guid(), info.info.m_userData);
+      if (number > given_up_by[who]) {
+        given_up_by[who] = number;
+        announce_due = true;
+      }
+    }
+    losses_changed.notify_one();
+  }
+  void on_publisher_discovery(fdds::DomainParticipant*, frtps::WriterDiscoveryInfo&& info) override {
+    if (info.status == frtps::WriterDiscoveryInfo::REMOVED_WRITER) return;
+    const std::lock_guard lock(losses_mutex);
+    const auto loss = given_up.find(prefix_of(info.info.guid()));
+    if (loss != given_up.end()) loss->second.writer = true;
+  }
+  void on_subscriber_discovery(fdds::DomainParticipant*, frtps::ReaderDiscoveryInfo&& info) override {
+    if (info.status == frtps::ReaderDiscoveryInfo::REMOVED_READER) return;
+    const std::lock_guard lock(losses_mutex);
+    const auto loss = given_up.find(prefix_of(info.info.guid()));
+    if (loss != given_up.end()) loss->second.reader = true;
+  }
+
+  // How often this process was given up by the participant with that user data: records of prefix and count.
+  static std::uint32_t number_of(const frtps::GUID_t& guid, const std::vector<unsigned char>& user_data) {
+    const auto& self = guid.guidPrefix.value;
+    for (std::size_t i = 0; i + kLossBytes <= user_data.size(); i += kLossBytes) {
+      if (!std::equal(std::begin(self), std::end(self), user_data.begin() + static_cast<std::ptrdiff_t>(i))) continue;
+      std::uint32_t number = 0;
+      std::memcpy(&number, user_data.data() + i + sizeof(Prefix), sizeof number);
+      return number;
+    }
+    return 0;
+  }
+
+  void tell(const std::stop_token& stop) {
+    std::unique_lock lock(losses_mutex);
+    const auto due = [&] { return tell_due || announce_due; };
+    while (!stop.stop_requested()) {
+      bool half_back = false;  // whether anybody came back whose endpoints did not
+      for (const auto& [who, loss] : given_up) half_back = half_back || (loss.back && !loss.healed());
+      if (half_back) {
+        if (!losses_changed.wait_for(lock, stop, kPatience, due) && !stop.stop_requested())
+          for (auto& [who, loss] : given_up)
+            if (loss.back && !loss.healed()) ++loss.number, tell_due = true;
+      } else {
+        losses_changed.wait(lock, stop, due);
+      }
+      const bool telling = std::exchange(tell_due, false), announcing = std::exchange(announce_due, false);
+      const auto losses = given_up;
+      lock.unlock();
+      if (telling) tell_losses(losses);
+      if (announcing) announce_anew();
+      lock.lock();
+    }
+  }
+
+  void tell_losses(const std::map<Prefix, Loss>& losses) const {
+    std::vector<unsigned char> user_data;
+    for (const auto& [who, loss] : losses) {
+      user_data.insert(user_data.end(), who.begin(), who.end());
+      const auto* bytes = reinterpret_cast<const unsigned char*>(&loss.number);
+      user_data.insert(user_data.end(), bytes, bytes + sizeof loss.number);
+    }
+    fdds::DomainParticipantQos qos = participant->get_qos();
+    qos.user_data().setValue(user_data);
+    if (participant->set_qos(qos) != ReturnCode_t::RETCODE_OK) spdlog::error("DDS does not take new user data");
+  }
+
+  void announce_anew() {
+    // A further partition, which nobody else is in, changes no matching, but makes DDS tell of every endpoint again.
+    spdlog::debug("others had lost this process; it announces itself anew");
+    const std::string more = session + "/" + std::to_string(++announcements);
+    fdds::PublisherQos publisher_qos = publisher->get_qos();
+    publisher_qos.partition().clear();
+    publisher_qos.partition().push_back(session.c_str());
+    publisher_qos.partition().push_back(more.c_str());
+    fdds::SubscriberQos subscriber_qos = subscriber->get_qos();
+    subscriber_qos.partition() = publisher_qos.partition();
+    if (publisher->set_qos(publisher_qos) != ReturnCode_t::RETCODE_OK ||
+        subscriber->set_qos(subscriber_qos) != ReturnCode_t::RETCODE_OK)
+      spdlog::error("DDS does not announce this process's endpoints again");
+  }
+
+  static constexpr std::size_t kLossBytes = sizeof(Prefix) + sizeof(std::uint32_t);
+  static constexpr std::size_t kMostGivenUp = 64;
+  static constexpr std::chrono::milliseconds kPatience{500};
 };
 
 Participant::Participant(const NetworkOptions& options, const std::string& session, const std::string& name)
     : impl_(std::make_unique<Impl>()) {
   route_log_once();
+  impl_->session = session;
   fdds::DomainParticipantQos qos;
   qos.name(name);
   set_transports(options, qos);
+  if (options.shared_memory) {
+    remove_stale_shm();
+    qos.wire_protocol().participant_id = fresh_participant_id(static_cast<int>(options.domain));
+  }
   set_discovery(options, qos);
-  impl_->participant = fdds::DomainParticipantFactory::get_instance()->create_participant(options.domain, qos);
+  impl_->participant = fdds::DomainParticipantFactory::get_instance()->create_participant(
+      options.domain, qos, impl_.get(), fdds::StatusMask::none());
   if (impl_->participant == nullptr)
     throw std::runtime_error("cannot join DDS domain " + std::to_string(options.domain) + " on interface " +
                              options.interface);
@@ -181,6 +355,7 @@ Participant::Participant(const NetworkOptions& options, const std::string& sessi
   impl_->subscriber = impl_->participant->create_subscriber(subscriber_qos);
   if (impl_->publisher == nullptr || impl_->subscriber == nullptr)
     throw std::runtime_error("cannot make a DDS publisher and subscriber");
+  impl_->teller = std::jthread([impl = impl_.get()](const std::stop_token& stop) { impl->tell(stop); });
 }
 
 Participant::~Participant() = default;

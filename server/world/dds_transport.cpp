@@ -20,7 +20,8 @@ struct DdsTransport::Link {
   WorldId id = 0;
   // Set on threads of DDS.
   std::atomic<bool> met_reader{false}, met_writer{false};  // ever
-  std::atomic<bool> reader_gone{false};
+  std::atomic<int> readers{0};  // that are there; a replacement may be found before its predecessor is given up
+  bool reader_gone() const { return met_reader.load() && readers.load() <= 0; }
   // Of the daemon's thread.
   bool missed = false;  // a message was dropped, and nobody has been told yet
   Clock::time_point retry_at{};
@@ -60,12 +61,11 @@ DdsTransport::Link* DdsTransport::find(WorldId neighbour) {
 }
 
 void DdsTransport::readers_changed(Link& link, int change) {
+  const int left = link.readers.fetch_add(change) + change;
   if (change < 0) {
-    link.reader_gone.store(true);
-    spdlog::info("lost world {}", link.id);
+    if (left <= 0) spdlog::info("lost world {}", link.id);
     return;
   }
-  link.reader_gone.store(false);
   const bool again = link.met_reader.exchange(true);
   if (again) {
     spdlog::info("world {} is back", link.id);
@@ -101,7 +101,7 @@ void DdsTransport::send(WorldId to, std::vector<std::byte> bytes) {
     return;
   }
   // Before the first meeting DDS keeps samples for the reader to come. After a parting the core sends again anyway.
-  const bool try_now = !link->reader_gone.load() && Clock::now() >= link->retry_at;
+  const bool try_now = !link->reader_gone() && Clock::now() >= link->retry_at;
   if (try_now) {
     const auto* first = reinterpret_cast<const std::uint8_t*>(bytes.data());
     link->sample.payload().assign(first, first + bytes.size());
@@ -120,7 +120,7 @@ std::optional<Incoming> DdsTransport::receive() {
   any_missed_ = false;
   for (const auto& link : links_) {
     if (!link->missed) continue;
-    if (!link->reader_gone.load() && now >= link->retry_at) {
+    if (!link->reader_gone() && now >= link->retry_at) {
       link->missed = false;
       any_missed_ = true;  // there may be others: look again next time
       return Incoming{Incoming::Kind::kInterrupted, link->id, {}};
@@ -139,7 +139,7 @@ void DdsTransport::flush(std::chrono::steady_clock::duration at_most) {
   const auto until = Clock::now() + at_most;
   for (const auto& link : links_) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now());
-    if (link->reader_gone.load()) continue;
+    if (link->reader_gone()) continue;
     if (left.count() <= 0 || !link->writer->wait_acknowledged(left))
       spdlog::warn("world {} has not acknowledged everything that it was sent", link->id);
   }

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <string>
+#include <vector>
 
 namespace soda::dds {
 namespace {
@@ -20,18 +21,29 @@ TEST(ShmCleanup, RemovesWhatNobodyHoldsAndNothingElse) {
   const auto exists = [&](const std::string& file) { return std::filesystem::exists(directory / file); };
   const std::string dead = "fastrtps_0123456789abcdef", alive = "fastrtps_fedcba9876543210";
   for (const std::string& segment : {dead, alive}) make(segment), make(segment + "_el");
-  for (const char* const other : {"fastrtps_port7410", "fastrtps_port7410_el", "somebody_el"}) make(other);
-  const int fd = ::open((directory / (alive + "_el")).c_str(), O_RDONLY | O_CLOEXEC);
-  ASSERT_EQ(::flock(fd, LOCK_EX | LOCK_NB), 0);
+  const std::string starting = "fastrtps_00000000000000aa";  // whose lock is still to be made
+  make(starting);
+  make("fastrtps_port7410"), make("sem.fastrtps_port7410_mutex");  // left by its reader
+  make("fastrtps_port7412"), make("fastrtps_port7412_el");         // its reader was killed
+  make("fastrtps_port7414"), make("fastrtps_port7414_el"), make("sem.fastrtps_port7414_mutex");
+  make("somebody_el"), make("fastrtps_portal");
+  std::vector<int> held;
+  for (const std::string& file : {alive, std::string("fastrtps_port7414")}) {
+    held.push_back(::open((directory / (file + "_el")).c_str(), O_RDONLY | O_CLOEXEC));
+    ASSERT_EQ(::flock(held.back(), LOCK_EX | LOCK_NB), 0);
+  }
 
-  EXPECT_EQ(remove_stale_segments(directory), 0u) << "too young";
-  EXPECT_EQ(remove_stale_segments(directory, std::chrono::seconds(0)), 1u);
-  EXPECT_FALSE(exists(dead));
-  EXPECT_FALSE(exists(dead + "_el"));
-  for (const std::string& kept : {alive, alive + "_el", std::string("fastrtps_port7410"),
-                                  std::string("fastrtps_port7410_el"), std::string("somebody_el")})
+  EXPECT_EQ(remove_stale_shm(directory), 0u) << "too young";
+  EXPECT_EQ(remove_stale_shm(directory, std::chrono::seconds(0)), 3u);
+  for (const std::string& gone :
+       {dead, dead + "_el", std::string("fastrtps_port7410"), std::string("sem.fastrtps_port7410_mutex"),
+        std::string("fastrtps_port7412"), std::string("fastrtps_port7412_el")})
+    EXPECT_FALSE(exists(gone)) << gone;
+  for (const std::string& kept :
+       {alive, alive + "_el", starting, std::string("fastrtps_port7414"), std::string("fastrtps_port7414_el"),
+        std::string("sem.fastrtps_port7414_mutex"), std::string("somebody_el"), std::string("fastrtps_portal")})
     EXPECT_TRUE(exists(kept)) << kept;
-  ::close(fd);
+  for (const int fd : held) ::close(fd);
   std::filesystem::remove_all(directory);
 }
 
