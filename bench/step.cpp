@@ -10,7 +10,6 @@
 #include "common/scene/generators.h"
 #include "common/state_hash.h"
 #include "server/border/codec.h"
-#include "server/border/near_sets.h"
 #include "server/physics/stepper.h"
 
 namespace soda::bench {
@@ -138,7 +137,7 @@ void measure_state(const std::string& name, const physics::Model& model, const B
   std::vector<std::byte> bytes;
   const double encoded = time_of([&] { bytes = border::encode(message); });
   const double decoded = time_of([&] { message = border::decode(bytes, model); });
-  if (!border::same(message.frames[0].set, set)) throw std::runtime_error("a decoded frame differs");
+  if (!same(message.frames[0].set, set)) throw std::runtime_error("a decoded frame differs");
   headline.add(name + ".frame_bytes_per_body", static_cast<double>(bytes.size()) / bodies);
   headline.add(name + ".frame_encode_ns_per_body", 1e9 * encoded / bodies);
   headline.add(name + ".frame_decode_ns_per_body", 1e9 * decoded / bodies);

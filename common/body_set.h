@@ -2,6 +2,7 @@
 // saved.
 #pragma once
 
+#include <cstring>
 #include <vector>
 
 #include "common/body_state.h"
@@ -14,5 +15,13 @@ struct BodySet {
   std::vector<ContactRecord> contacts;  // in canonical order (record_before); every a is in `bodies`
   void clear() { bodies.clear(), contacts.clear(); }
 };
+
+// Bit for bit.
+inline bool same(const BodySet& l, const BodySet& r) {
+  const auto same_bytes = [](const auto& a, const auto& b) {
+    return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0);
+  };
+  return same_bytes(l.bodies, r.bodies) && same_bytes(l.contacts, r.contacts);
+}
 
 }  // namespace soda

@@ -20,6 +20,24 @@ T number(std::string_view text, const std::string& whole, const char* what) {
 
 }  // namespace
 
+const std::vector<std::string>& sync_names() {
+  static const std::vector<std::string> names{"single", "conservative", "anticipative"};
+  return names;
+}
+
+const std::string& sync_name(unsigned char mode) {
+  static const std::string unknown = "unknown";
+  return mode < sync_names().size() ? sync_names()[mode] : unknown;
+}
+
+SyncMode parse_sync(const std::string& name) {
+  const auto at = std::find(sync_names().begin(), sync_names().end(), name);
+  if (at == sync_names().end())
+    throw std::invalid_argument("a way to synchronise is 'single', 'conservative' or 'anticipative', not '" + name +
+                                "'");
+  return static_cast<SyncMode>(at - sync_names().begin());
+}
+
 double parse_pace(const std::string& text) {
   constexpr double kMost = 1e6;
   if (text == "realtime") return 1;

@@ -11,7 +11,18 @@
 namespace soda {
 
 constexpr Step kDefaultSteps = 600;  // 10 s at 60 Hz
-constexpr Step kDefaultWindow = 48;  // K: steps that a clock may be ahead of the displayed one, as in the paper
+constexpr Step kDefaultWindow = 48;  // K, as in the paper: steps beyond the final one that a world may compute
+constexpr Step kLargestWindow = 4096;
+
+// How worlds keep in step; the numbers go over the network (Session.sync).
+enum class SyncMode : unsigned char {
+  kSingle = 0,        // one world, no network: the reference
+  kConservative = 1,  // nothing is assumed about neighbours
+  kAnticipative = 2,  // worlds run ahead under assumptions, and repair
+};
+const std::vector<std::string>& sync_names();      // by number
+const std::string& sync_name(unsigned char mode);  // "unknown" beyond them
+SyncMode parse_sync(const std::string& name);
 
 // "realtime": 1; "max": 0 (as fast as possible); else a multiple of real time.
 double parse_pace(const std::string& text);

@@ -18,7 +18,6 @@
 #include "client/cli/dds_source.h"
 #include "client/cli/session_run.h"
 #include "common/dds/checks.h"
-#include "common/dds/shm_cleanup.h"
 #include "common/grid.h"
 #include "common/import/load.h"
 #include "common/run_settings.h"
@@ -35,7 +34,8 @@ struct RunOptions {
   WorldId worlds = 4;
   Step steps = kDefaultSteps;
   std::string pace = "realtime";
-  std::string sync = "conservative";
+  std::string sync = "anticipative";
+  Step window = kDefaultWindow;
   std::string dump_steps;
   std::string start;  // worlds to start here; "": all
   dds::NetworkOptions network;
@@ -141,7 +141,7 @@ std::vector<std::string> arguments(const RunOptions& o, WorldId world) {
   if (o.follow.verbose) add({"--verbose"});
   if (world != 0) return args;
   add({"--scene-fd", std::to_string(kSceneFd), "--worlds", std::to_string(o.worlds), "--steps", std::to_string(o.steps),
-       "--pace", o.pace, "--sync", o.sync});
+       "--pace", o.pace, "--sync", o.sync, "--anticipation", std::to_string(o.window)});
   if (o.single()) add({"--report-fd", std::to_string(kReportFd)});
   if (!o.dump_steps.empty()) add({"--dump-steps", o.dump_steps});
   return args;
@@ -168,7 +168,6 @@ int run(RunOptions& options) {
     pipe_out = std::make_unique<Descriptor>(fds[1]);
     source = std::make_unique<PipeSource>(pipe_in->get());
   } else {
-    dds::remove_stale_segments();
     source = std::make_unique<DdsSource>(options.network, options.session, !options.follow.files.dump.empty());
   }
   Processes processes(
@@ -204,8 +203,12 @@ void add_run_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command
       ->add_option("--sync", o->sync,
-                   "'conservative', or 'single': one world in one process without network, the reference")
-      ->check(CLI::IsMember({"single", "conservative"}))
+                   "'anticipative': worlds run ahead of each other and repair; 'conservative': they wait for each "
+                   "other; 'single': one world in one process without network, the reference")
+      ->check(CLI::IsMember(sync_names()))
+      ->capture_default_str();
+  command->add_option("--anticipation", o->window, "K: steps beyond the final one that a world may compute")
+      ->check(CLI::Range(Step{1}, kLargestWindow))
       ->capture_default_str();
   command->add_option("--hash-log", o->follow.files.hash_log,
                       "write 'STEP BODIES HASH' for each final step to this file");

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "client/cli/table.h"
+#include "common/run_settings.h"
 #include "common/scene_hash.h"
 
 namespace soda::cli {
@@ -67,6 +68,11 @@ void add_counters(Object& object, const wire::Status& s) {
   object.add("refused", s.refused());
   object.add("clamped", s.clamped());
   object.add("non_finite", s.non_finite());
+  object.add("anticipated", s.anticipated());
+  object.add("bodies_computed", s.bodies_computed());
+  object.add("bodies_redone", s.bodies_redone());
+  object.add("rollbacks", s.rollbacks());
+  object.add("longest_rollback", s.longest_rollback());
   object.add("interruptions", s.interruptions());
   object.add("work_seconds", s.work_seconds());
   object.add("waiting_seconds", s.waiting_seconds());
@@ -85,6 +91,9 @@ wire::Status sum_of(const std::vector<wire::Status>& worlds) {
     sum.parts_sent() += s.parts_sent(), sum.messages_resent() += s.messages_resent();
     sum.duplicates() += s.duplicates(), sum.refused() += s.refused(), sum.clamped() += s.clamped();
     sum.non_finite() += s.non_finite(), sum.interruptions() += s.interruptions();
+    sum.anticipated() += s.anticipated(), sum.bodies_computed() += s.bodies_computed();
+    sum.bodies_redone() += s.bodies_redone(), sum.rollbacks() += s.rollbacks();
+    sum.longest_rollback() = std::max(sum.longest_rollback(), s.longest_rollback());
     sum.work_seconds() += s.work_seconds(), sum.waiting_seconds() += s.waiting_seconds();
     sum.paced_seconds() += s.paced_seconds(), sum.cpu_seconds() += s.cpu_seconds();
     sum.peak_memory() += s.peak_memory();
@@ -100,6 +109,7 @@ std::string world_json(const wire::Status& s) {
   object.add("pid", s.pid());
   object.add("clock", s.clock());
   object.add("final_step", s.final_step());
+  object.add("front", s.front());
   object.add("neighbours", s.neighbours());
   add_counters(object, s);
   return object.str();
@@ -116,7 +126,7 @@ void write_stats(const std::filesystem::path& path, const Collector& collector, 
     const double wall = collector.wall_seconds();
     root.text("scene", session.scene_name());
     root.text("scene_hash", to_hex(session.scene_hash()));
-    root.text("sync", session.sync() == wire::SYNC_SINGLE ? "single" : "conservative");
+    root.text("sync", sync_name(session.sync()));
     root.add("worlds", session.worlds());
     root.add("last_step", session.last_step());
     root.add("final_step", steps);

@@ -82,8 +82,8 @@ void Table::update(const Collector& collector) {
 
 void Table::draw(const Collector& collector, Clock::time_point now) {
   std::vector<std::string> lines;
-  lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9}  {}", "world", "cells", "bodies",
-                              "clock", "final", "steps/s", "syncs", "waiting", "state"));
+  lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}  {}", "world", "cells", "bodies",
+                              "clock", "final", "steps/s", "syncs", "repairs", "waiting", "state"));
   const std::size_t room = std::max<std::size_t>(4, terminal_rows()) - 3;
   const auto& worlds = collector.worlds();
   for (std::size_t i = 0; i < worlds.size(); ++i) {
@@ -92,8 +92,9 @@ void Table::draw(const Collector& collector, Clock::time_point now) {
     if (lines.size() >= room && i + 1 < worlds.size()) continue;
     const auto heard = collector.heard(s.world());
     const char* state = !heard ? "not here yet" : now - *heard > dds::kSilence ? "silent" : state_name(s.state());
-    lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9.0f} {:>9} {:>8.2f}s  {}", s.world(), s.cells(),
-                                s.bodies(), s.clock(), s.final_step(), speed, s.syncs(), s.waiting_seconds(), state));
+    lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9.0f} {:>9} {:>9} {:>8.2f}s  {}", s.world(),
+                                s.cells(), s.bodies(), s.clock(), s.final_step(), speed, s.syncs(), s.rollbacks(),
+                                s.waiting_seconds(), state));
   }
   if (lines.size() < worlds.size() + 1) lines.insert(lines.end() - 1, fmt::format("{:>5}", "..."));
   const double speed = total_.at(now, collector.whole_steps());
@@ -133,10 +134,13 @@ void print_summary(const Collector& collector, bool complete) {
   const double wall = collector.wall_seconds();
   const double simulated = static_cast<double>(steps) * session.dt();
   std::uint64_t syncs = 0, mixed = 0, arrived = 0, bytes = 0, interruptions = 0, clamped = 0, held = 0;
+  std::uint64_t anticipated = 0, rollbacks = 0, computed = 0, redone = 0;
   double waiting = 0, cpu = 0;
   for (const wire::Status& s : collector.worlds()) {
     syncs += s.syncs(), mixed += s.mixed_islands(), arrived += s.arrived(), bytes += s.bytes_sent();
     interruptions += s.interruptions(), clamped += s.clamped(), held += s.non_finite();
+    anticipated += s.anticipated(), rollbacks += s.rollbacks();
+    computed += s.bodies_computed(), redone += s.bodies_redone();
     waiting += s.waiting_seconds(), cpu += s.cpu_seconds();
   }
   std::string text = fmt::format("{}: {} bodies, {} steps on {} {}: {:.2f} s simulated in {:.2f} s",
@@ -151,6 +155,9 @@ void print_summary(const Collector& collector, bool complete) {
     text += fmt::format(
         ", {:.1f} s waiting; {} synchronised steps, {} mixed islands, {} bodies changed worlds, {:.1f} MB sent",
         waiting, syncs, mixed, arrived, 1e-6 * static_cast<double>(bytes));
+  if (anticipated > 0)
+    text += fmt::format("\n{} steps anticipated; {} rollbacks, which did {} of {} results of bodies again", anticipated,
+                        rollbacks, redone, computed);
   if (interruptions > 0) text += fmt::format("\n{} interrupted connections were taken up again", interruptions);
   if (clamped > 0) text += fmt::format("\nwarning: bodies were slowed to the scene's largest speed {} times", clamped);
   if (held > 0) text += fmt::format("\nwarning: {} results were not finite and held back", held);

@@ -8,6 +8,7 @@
 
 #include "common/body_state.h"
 #include "common/contact_record.h"
+#include "common/run_settings.h"
 #include "common/version.h"
 
 namespace soda::dds {
@@ -93,8 +94,8 @@ std::string problem(const wire::Session& s) {
   if (s.scene_bytes() == 0 || s.scene_bytes() > kMaxSceneBytes) return "impossible scene size";
   if (s.worlds() == 0 || s.worlds() > kMaxWorlds) return "impossible number of worlds";
   if (!ok_step(s.last_step())) return "impossible last step";
-  if (s.sync() > wire::SYNC_CONSERVATIVE) return "unknown sync mode";
-  if (s.window() == 0 || s.window() > 100000) return "impossible window";
+  if (s.sync() > wire::SYNC_ANTICIPATIVE) return "unknown sync mode";
+  if (s.window() == 0 || s.window() > kLargestWindow) return "impossible window";
   if (!std::isfinite(s.dt()) || s.dt() <= 0) return "impossible dt";
   if (!ok_seconds(s.pace())) return "impossible pace";
   if (s.dump_first() < -1 || s.dump_last() < s.dump_first() || s.dump_last() > kMaxStepNumber)

@@ -107,14 +107,12 @@ Frame get_frame(Reader& in, std::span<const std::byte>& rest, const physics::Mod
 void put_part(std::vector<std::byte>& out, const Part& part) {
   put(out, part.origin);
   put(out, part.step);
-  put(out, part.through);
   put(out, part.revision);
-  put(out, static_cast<std::uint8_t>(part.final));
   put(out, static_cast<std::uint32_t>(part.components.size()));
-  for (const Component& component : part.components) {
-    encode_set(component.set, out);
-    put(out, static_cast<std::uint32_t>(component.ports.size()));
-    for (const Port& port : component.ports) {
+  for (const auto& component : part.components) {
+    encode_set(component->set, out);
+    put(out, static_cast<std::uint32_t>(component->ports.size()));
+    for (const Port& port : component->ports) {
       put(out, port.body);
       put(out, port.owner);
       put(out, port.record);
@@ -126,11 +124,10 @@ Part get_part(Reader& in, std::span<const std::byte>& rest, const physics::Model
   Part part;
   part.origin = in.get<WorldId>("part origin");
   part.step = in.get<Step>("part step");
-  part.through = in.get<Step>("part through");
   part.revision = in.get<Revision>("part revision");
-  part.final = in.get<std::uint8_t>("part final") != 0;
   part.components.resize(in.count(12, "part components"));
-  for (Component& component : part.components) {
+  for (auto& kept : part.components) {
+    Component component;
     component.set = decode_set(rest, model);
     component.ports.resize(in.count(20, "ports"));
     for (Port& port : component.ports) {
@@ -139,6 +136,7 @@ Part get_part(Reader& in, std::span<const std::byte>& rest, const physics::Model
       port.record = in.get<std::uint64_t>("port record");
       if (!model.find(port.body)) throw CodecError("port: " + name(port.body) + " is not in the scene");
     }
+    kept = std::make_shared<const Component>(std::move(component));
   }
   return part;
 }
@@ -162,12 +160,15 @@ void check(const Message& message, WorldId me, WorldId worlds) {
   for (const Part& part : message.parts) {
     if (part.origin >= worlds || part.origin == me)
       throw CodecError("part: origin " + std::to_string(part.origin) + " cannot be");
-    for (const Component& component : part.components) {
-      for (const Port& port : component.ports)
+    for (const auto& component : part.components) {
+      for (const Port& port : component->ports)
         if (port.owner >= worlds) throw CodecError("port: no world " + std::to_string(port.owner));
-      check_ends(component.set, component.ports, false);
+      check_ends(component->set, component->ports, false);
     }
   }
+  for (const FinalPart& part : message.finals)
+    if (part.origin >= worlds || part.origin == me)
+      throw CodecError("final part: origin " + std::to_string(part.origin) + " cannot be");
 }
 
 void encode_set(const BodySet& set, std::vector<std::byte>& out) {
@@ -218,11 +219,18 @@ std::vector<std::byte> encode(const Message& message) {
   put(out, static_cast<std::uint8_t>(h.need));
   put(out, h.upto);
   put(out, h.final_step);
+  put(out, h.near_final);
   put(out, h.durable);
   put(out, static_cast<std::uint32_t>(message.frames.size()));
   put(out, static_cast<std::uint32_t>(message.parts.size()));
+  put(out, static_cast<std::uint32_t>(message.finals.size()));
   for (const Frame& frame : message.frames) put_frame(out, frame);
   for (const Part& part : message.parts) put_part(out, part);
+  for (const FinalPart& part : message.finals) {
+    put(out, part.origin);
+    put(out, part.step);
+    put(out, part.revision);
+  }
   return out;
 }
 
@@ -245,10 +253,19 @@ Message decode(std::span<const std::byte> bytes, const physics::Model& model) {
   h.need = in.get<std::uint8_t>("need") != 0;
   h.upto = in.get<Step>("upto");
   h.final_step = in.get<Step>("final");
+  h.near_final = in.get<Step>("near final");
   h.durable = in.get<Step>("durable");
-  const std::size_t frames = in.count(24, "frames"), parts = in.count(33, "parts");
+  const std::size_t frames = in.count(24, "frames"), parts = in.count(24, "parts"),
+                    finals = in.count(20, "final parts");
   for (std::size_t i = 0; i < frames; ++i) message.frames.push_back(get_frame(in, rest, model));
   for (std::size_t i = 0; i < parts; ++i) message.parts.push_back(get_part(in, rest, model));
+  for (std::size_t i = 0; i < finals; ++i) {
+    FinalPart part;
+    part.origin = in.get<WorldId>("final part origin");
+    part.step = in.get<Step>("final part step");
+    part.revision = in.get<Revision>("final part revision");
+    message.finals.push_back(part);
+  }
   if (!in.empty()) throw CodecError("border message: more bytes than it says");
   return message;
 }

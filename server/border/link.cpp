@@ -20,17 +20,20 @@ Header Link::header(std::uint64_t sequence, bool need) const {
   h.need = need;
   h.upto = told_upto_;
   h.final_step = told_final_;
+  h.near_final = told_near_final_;
   return h;
 }
 
-void Link::send(Step upto, Step final_step, std::vector<std::vector<std::byte>>& out) {
+void Link::send(Step upto, Step final_step, Step near_final, std::vector<std::vector<std::byte>>& out) {
   told_upto_ = upto;
   told_final_ = final_step;
+  told_near_final_ = near_final;
   next_.header = header(++sent_, false);
   log_.push_back(encode(next_));
   out.push_back(log_.back());
   next_.frames.clear();
   next_.parts.clear();
+  next_.finals.clear();
 }
 
 void Link::interrupted() { ask_ = repeat_ = true; }
@@ -68,6 +71,7 @@ void Link::receive(Message message, const std::function<void(Message&)>& deliver
     ++received_;
     upto_ = next.header.upto;
     final_ = std::max(final_, next.header.final_step);
+    near_final_ = std::max(near_final_, next.header.near_final);
   }
   if (!early_.empty() && asked_after_ != received_) ask_ = true;
 }

@@ -22,11 +22,13 @@ class Link {
   // ---- out
   void add(Frame frame) { next_.frames.push_back(std::move(frame)); }
   void add(Part part) { next_.parts.push_back(std::move(part)); }
-  bool has_content() const { return !next_.frames.empty() || !next_.parts.empty(); }
+  void add(FinalPart part) { next_.finals.push_back(part); }
+  bool has_content() const { return !next_.frames.empty() || !next_.parts.empty() || !next_.finals.empty(); }
   Step told_upto() const { return told_upto_; }
   Step told_final() const { return told_final_; }
+  Step told_near_final() const { return told_near_final_; }
   // Closes the next message of the stream and appends it, as bytes, to `out`.
-  void send(Step upto, Step final_step, std::vector<std::vector<std::byte>>& out);
+  void send(Step upto, Step final_step, Step near_final, std::vector<std::vector<std::byte>>& out);
   // Asks the peer for what is missing here, and repeats what it has not acknowledged, at the next collect().
   void interrupted();
   // Appends requests and repetitions that are due.
@@ -39,6 +41,7 @@ class Link {
   // The peer's values, counted: everything said before them has been delivered.
   Step upto() const { return upto_; }
   Step final_step() const { return final_; }
+  Step near_final() const { return near_final_; }
   std::uint64_t duplicates() const { return duplicates_; }
   std::uint64_t resent() const { return resent_; }
 
@@ -50,7 +53,7 @@ class Link {
   std::uint32_t peer_epoch_ = 0;
 
   Message next_;
-  Step told_upto_ = -1, told_final_ = -1;
+  Step told_upto_ = -1, told_final_ = -1, told_near_final_ = -1;
   std::uint64_t sent_ = 0;                  // newest number sent
   std::deque<std::vector<std::byte>> log_;  // messages sent_ - log_.size() + 1 .. sent_
   bool repeat_ = false, ask_ = false;
@@ -58,7 +61,7 @@ class Link {
   std::uint64_t received_ = 0;                     // everything up to this number has been delivered
   std::uint64_t asked_after_ = ~std::uint64_t{0};  // the gap after this number has been asked for already
   std::map<std::uint64_t, Message> early_;         // beyond a gap
-  Step upto_ = -1, final_ = -1;
+  Step upto_ = -1, final_ = -1, near_final_ = -1;
   std::uint64_t duplicates_ = 0, resent_ = 0;
 };
 

@@ -1,7 +1,9 @@
 // What worlds tell each other, as plain values. codec.h turns it into bytes and back.
 #pragma once
 
+#include <compare>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "common/body_set.h"
@@ -9,8 +11,10 @@
 
 namespace soda::border {
 
+// Of what one world says of one step: later ones replace earlier ones.
 struct Revision {
   std::uint32_t epoch = 0, count = 0;
+  auto operator<=>(const Revision&) const = default;
 };
 
 // The bodies that the sender produced at a step and that the receiver owns then (arrivals) or has near. Left out where
@@ -35,14 +39,19 @@ struct Component {
   std::vector<Port> ports;
 };
 
-// All components of a world that touch foreign bodies at a step.
+// All components of a world that touch foreign bodies at a step. Components are shared with whoever else keeps them.
 struct Part {
   WorldId origin = 0;
   Step step = 0;
-  Step through = 0;  // newest step for which it holds unchanged; this version sends one part per step
   Revision revision;
-  bool final = false;
-  std::vector<Component> components;
+  std::vector<std::shared_ptr<const Component>> components;
+};
+
+// That part of another world, passed on before, will not change any more.
+struct FinalPart {
+  WorldId origin = 0;
+  Step step = 0;
+  Revision revision;
 };
 
 struct Header {
@@ -52,9 +61,10 @@ struct Header {
   std::uint64_t sequence = 0;  // from 1; 0: outside of the stream, only `ack` and `need` count
   std::uint64_t ack = 0;       // everything up to this number has arrived at the sender
   bool need = false;           // the sender asks for everything after `ack` again
-  Step upto = 0;               // the sender's front: all states up to it are computed and told
+  Step upto = 0;               // the sender's front: all states up to it are computed and told; can fall
   Step final_step = 0;
-  Step durable = 0;
+  Step near_final = 0;  // up to this step the sender's parts will not change any more
+  Step durable = 0;     // for checkpoints, later
 };
 
 // Everything from one world to another is one numbered stream of these.
@@ -62,6 +72,7 @@ struct Message {
   Header header;
   std::vector<Frame> frames;
   std::vector<Part> parts;
+  std::vector<FinalPart> finals;
 };
 
 }  // namespace soda::border

@@ -9,16 +9,27 @@
 
 namespace soda::border {
 
-bool MixedIslands::add(Part part) {
+std::uint64_t component_hash(const Component& component) {
+  std::uint64_t hash = full_hash(component.set);
+  for (const Port& port : component.ports)
+    for (const std::uint64_t word : {port.body, std::uint64_t{port.owner}, port.record})
+      hash = (hash ^ word) * 0x9e3779b97f4a7c15u + (hash >> 31);
+  return hash;
+}
+
+bool MixedIslands::put(Part part) {
   const WorldId origin = part.origin;
-  if (parts_.contains(origin)) return false;
+  const auto old = parts_.find(origin);
+  if (old != parts_.end() && part.revision <= old->second.part.revision) return false;
   Indexed indexed;
   for (std::uint32_t i = 0; i < part.components.size(); ++i) {
-    for (const BodyState& body : part.components[i].set.bodies) indexed.holder.emplace(body.id, i);
-    for (const Port& port : part.components[i].ports) indexed.port_users.emplace(port.body, i);
+    const Component& component = *part.components[i];
+    indexed.hashes.push_back(component_hash(component));
+    for (const BodyState& body : component.set.bodies) indexed.holder.emplace(body.id, i);
+    for (const Port& port : component.ports) indexed.port_users.emplace(port.body, i);
   }
   indexed.part = std::move(part);
-  parts_.emplace(origin, std::move(indexed));
+  parts_.insert_or_assign(origin, std::move(indexed));
   return true;
 }
 
@@ -31,6 +42,11 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
   std::set<Key> seen{from};
   std::set<WorldId> used{from.origin}, missing;
   std::vector<Key> todo{from};
+  Closure closure;
+  const auto misfit = [&](WorldId world, std::string why) {
+    missing.insert(world);
+    if (closure.misfit.empty()) closure.misfit = std::move(why);
+  };
   const auto visit = [&](Key key) {
     if (seen.insert(key).second) todo.push_back(key);
   };
@@ -47,25 +63,31 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
   while (!todo.empty()) {
     const Key key = todo.back();
     todo.pop_back();
-    const Component& component = parts_.at(key.origin).part.components[key.component];
+    const Indexed& origin = parts_.at(key.origin);
+    const Component& component = *origin.part.components[key.component];
+    closure.content += origin.hashes[key.component];
     for (const Port& port : component.ports) {
       const Indexed* part = part_of(port.owner);
       if (!part) continue;
       const auto holder = part->holder.find(port.body);
-      if (holder == part->holder.end())
-        throw ProtocolError("world " + std::to_string(key.origin) + " touches body " + std::to_string(port.body) +
-                            ", but its owner " + std::to_string(port.owner) + " does not say so");
-      const auto& bodies = part->part.components[holder->second].set.bodies;
+      if (holder == part->holder.end()) {
+        misfit(port.owner, "world " + std::to_string(key.origin) + " touches body " + std::to_string(port.body) +
+                               ", but its owner " + std::to_string(port.owner) + " does not say so");
+        continue;
+      }
+      const auto& bodies = part->part.components[holder->second]->set.bodies;
       const auto body = std::lower_bound(bodies.begin(), bodies.end(), port.body,
                                          [](const BodyState& b, BodyId id) { return b.id < id; });
-      if (record_hash(*body) != port.record)
-        throw ProtocolError("worlds " + std::to_string(key.origin) + " and " + std::to_string(port.owner) +
-                            " hold different states of body " + std::to_string(port.body));
+      if (record_hash(*body) != port.record) {
+        misfit(port.owner, "worlds " + std::to_string(key.origin) + " and " + std::to_string(port.owner) +
+                               " hold different states of body " + std::to_string(port.body));
+        continue;
+      }
       visit({port.owner, holder->second});
     }
     for (const BodyState& body : component.set.bodies) {
-      if (!neighbourhood_.is_wide(body)) continue;
-      neighbourhood_.reached(body, reached);
+      if (!neighbourhood_->is_wide(body)) continue;
+      neighbourhood_->reached(body, reached);
       for (const WorldId world : reached)
         if (const Indexed* part = part_of(world)) {
           const auto [first, last] = part->port_users.equal_range(body.id);
@@ -73,32 +95,35 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
         }
     }
   }
-  Closure closure;
   closure.components.assign(seen.begin(), seen.end());
   closure.worlds.assign(used.begin(), used.end());
   closure.missing.assign(missing.begin(), missing.end());
   return closure;
 }
 
-BodySet MixedIslands::assemble(const Closure& closure) const {
+std::optional<BodySet> MixedIslands::assemble(const Closure& closure, std::string& misfit) const {
   BodySet set;
   for (const Key& key : closure.components) {
-    const BodySet& component = parts_.at(key.origin).part.components[key.component].set;
+    const BodySet& component = parts_.at(key.origin).part.components[key.component]->set;
     set.bodies.insert(set.bodies.end(), component.bodies.begin(), component.bodies.end());
     set.contacts.insert(set.contacts.end(), component.contacts.begin(), component.contacts.end());
   }
   std::sort(set.bodies.begin(), set.bodies.end(), [](const BodyState& l, const BodyState& r) { return l.id < r.id; });
   for (std::size_t i = 1; i < set.bodies.size(); ++i)
-    if (set.bodies[i].id == set.bodies[i - 1].id)
-      throw ProtocolError("two worlds own body " + std::to_string(set.bodies[i].id));
+    if (set.bodies[i].id == set.bodies[i - 1].id) {
+      misfit = "two worlds own body " + std::to_string(set.bodies[i].id);
+      return std::nullopt;
+    }
   // A contact across a border is found by both sides; they must have found the same.
   std::sort(set.contacts.begin(), set.contacts.end(), record_before);
   std::size_t kept = 0;
   for (const ContactRecord& record : set.contacts) {
     if (kept > 0 && !record_before(set.contacts[kept - 1], record)) {
-      if (std::memcmp(&set.contacts[kept - 1], &record, sizeof record) != 0)
-        throw ProtocolError("two worlds found different contacts between bodies " + std::to_string(record.a) + " and " +
-                            std::to_string(record.b & ~kStaticBit));
+      if (std::memcmp(&set.contacts[kept - 1], &record, sizeof record) != 0) {
+        misfit = "two worlds found different contacts between bodies " + std::to_string(record.a) + " and " +
+                 std::to_string(record.b & ~kStaticBit);
+        return std::nullopt;
+      }
       continue;
     }
     set.contacts[kept++] = record;

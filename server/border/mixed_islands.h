@@ -2,7 +2,8 @@
 //
 // The graph has the components of all parts as nodes. A component leads to the component that holds a body which it has
 // as a port; a wide body leads to every component that has it as a port, so every world that it reaches must have told
-// its part, if only to say that nothing touches it there. An island is closed when nothing that is led to is missing.
+// its part, if only to say that nothing touches it there. An island is closed when nothing that is led to is missing,
+// lacks a body, or holds another record of it.
 #pragma once
 
 #include <cstdint>
@@ -24,38 +25,48 @@ struct ProtocolError : std::logic_error {
 
 class MixedIslands {
  public:
-  explicit MixedIslands(const Neighbourhood& neighbourhood) : neighbourhood_(neighbourhood) {}
+  explicit MixedIslands(const Neighbourhood& neighbourhood) : neighbourhood_(&neighbourhood) {}
 
   struct Key {
     WorldId origin = 0;
     std::uint32_t component = 0;
-    bool operator<(const Key& o) const { return origin != o.origin ? origin < o.origin : component < o.component; }
+    auto operator<=>(const Key&) const = default;
   };
   struct Closure {
     std::vector<Key> components;   // reached so far, ascending
     std::vector<WorldId> worlds;   // whose parts were used, ascending
-    std::vector<WorldId> missing;  // whose parts are still needed; empty: closed
+    std::vector<WorldId> missing;  // whose parts are lacking, or do not fit (yet); empty: closed
+    std::uint64_t content = 0;     // hash of all components
+    std::string misfit;            // what does not fit, if anything
   };
 
-  void clear() { parts_.clear(); }
-  // Keeps the first part of each origin; false where there was one already.
-  bool add(Part part);
+  // Takes a part, in place of an older one of that origin; false where it is not newer.
+  bool put(Part part);
   const Part* find(WorldId origin) const;
+  template <typename F>
+  void for_each(F&& f) const {
+    for (const auto& [origin, indexed] : parts_) f(indexed.part);
+  }
 
   // Everything that component leads to, as far as the parts at hand go.
   Closure close(Key from) const;
 
-  // Bodies and contacts of all components of a closed island.
-  BodySet assemble(const Closure& closure) const;
+  // Bodies and contacts of all components of a closed island; nothing where two worlds' do not fit together, which
+  // `misfit` then tells.
+  std::optional<BodySet> assemble(const Closure& closure, std::string& misfit) const;
 
  private:
   struct Indexed {
     Part part;
+    std::vector<std::uint64_t> hashes;                          // by component
     std::unordered_map<BodyId, std::uint32_t> holder;           // body -> component
     std::unordered_multimap<BodyId, std::uint32_t> port_users;  // port -> components
   };
-  const Neighbourhood& neighbourhood_;
+  const Neighbourhood* neighbourhood_;
   std::map<WorldId, Indexed> parts_;
 };
+
+// Of a component's whole content.
+std::uint64_t component_hash(const Component& component);
 
 }  // namespace soda::border

@@ -67,9 +67,10 @@ Neighbourhood::Neighbourhood(const physics::Model& model, const TerritoryMap& ma
       }
 }
 
-Neighbourhood::Place Neighbourhood::place(const BodyState& body) const {
+timeline::Place Neighbourhood::place(const BodyState& body) const {
+  if (neighbours_.empty()) return {me_, false, true};
   const std::size_t cell = map_.grid.index(map_.grid.cell_of(body.x()));
-  Place place;
+  timeline::Place place;
   place.owner = map_.owner[cell];
   const auto index = static_cast<std::size_t>(model_.find(body.id) - model_.bodies().data());
   if (!(body.v().squaredNorm() <= ordinary_below_[index])) {

@@ -7,6 +7,7 @@
 #include "common/body_state.h"
 #include "common/territory.h"
 #include "server/physics/model.h"
+#include "server/timeline/record.h"
 
 namespace soda::border {
 
@@ -21,13 +22,9 @@ class Neighbourhood {
 
   WorldId owner(const BodyState& body) const { return map_.owner_of(body.x()); }
   std::size_t own_cells() const { return own_cells_; }
+  double half_cell() const { return half_edge_; }  // m
 
-  struct Place {
-    WorldId owner = 0;
-    bool wide = false;    // its reach box reaches more than half a cell from its centre along an axis
-    bool inside = false;  // nobody but its owner can have anything to do with it
-  };
-  Place place(const BodyState& body) const;
+  timeline::Place place(const BodyState& body) const;
   bool is_wide(const BodyState& body) const { return place(body).wide; }
 
   // The worlds other than the body's owner that its reach box, enlarged by half a cell, reaches. Ascending.

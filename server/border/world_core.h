@@ -2,8 +2,9 @@
 // clocks nor networks and never blocks, so that the same code runs over DDS, in one process under a simulated network,
 // and alone as the reference (one world, no neighbours).
 //
-// This is the conservative mode: nothing is assumed about a neighbour; step t is computed once every neighbour's stream
-// has reached t. docs/architecture.md tells the protocol as a whole.
+// A world goes on under assumptions about its neighbours and repairs what turns out to be wrong (server/timeline), or,
+// in the conservative mode, assumes nothing: step t is computed once every neighbour's stream has reached t.
+// docs/architecture.md tells the protocol as a whole.
 #pragma once
 
 #include <cstddef>
@@ -17,15 +18,20 @@
 #include "common/ids.h"
 #include "common/territory.h"
 #include "server/physics/model.h"
+#include "server/timeline/timeline.h"
 
 namespace soda::border {
 
+enum class Sync { kConservative, kAnticipative };
+
 struct CoreSettings {
   WorldId me = 0;
-  std::uint32_t epoch = 0;  // of this start of the world
-  std::uint64_t session =
-      0;  // what all worlds of a session have in common (a hash of scene and settings); others' messages are refused
-  Step last_step = 0;  // the run ends when this step is final
+  std::uint32_t epoch = 0;    // of this start of the world
+  std::uint64_t session = 0;  // what all worlds of a session have in common (a hash of scene and settings); others'
+                              // messages are refused
+  Step last_step = 0;         // the run ends when this step is final
+  Sync sync = Sync::kAnticipative;
+  Step window = 48;  // K: steps beyond the final one that may be computed
 };
 
 struct CoreStats {
@@ -39,21 +45,34 @@ struct CoreStats {
   std::uint64_t frames_sent = 0, frame_bodies_sent = 0;  // frames that held bodies, and how many
   std::uint64_t parts_sent = 0;                          // own parts and parts passed on
   std::uint64_t messages_resent = 0;
-  std::uint64_t duplicates = 0;  // messages received again, ignored
-  std::uint64_t refused = 0;     // malformed or foreign messages, and protocol errors
-  std::uint64_t clamped = 0;     // bodies slowed to the scene's largest speed, summed over steps
-  std::uint64_t non_finite = 0;  // bodies whose result was not finite and which were held, summed over steps
+  std::uint64_t duplicates = 0;   // messages received again, ignored
+  std::uint64_t refused = 0;      // malformed or foreign messages, and protocol errors
+  std::uint64_t clamped = 0;      // bodies slowed to the scene's largest speed, summed over steps
+  std::uint64_t non_finite = 0;   // bodies whose result was not finite and which were held, summed over steps
+  std::uint64_t anticipated = 0;  // steps computed before all neighbours were known to have reached them
+  timeline::TimelineStats timeline;
+};
+
+// A final state, valid for the call.
+class Produced {
+ public:
+  Produced(const timeline::Timeline& timeline, Step step) : timeline_(timeline), step_(step) {}
+  std::size_t bodies() const { return timeline_.count(step_); }
+  std::uint64_t hash() const { return timeline_.hash(step_); }  // bodies_hash
+  BodySet all() const { return timeline_.all_produced(step_); }
+
+ private:
+  const timeline::Timeline& timeline_;
+  Step step_;
 };
 
 // Told what a world computes. All calls come from within WorldCore::work or receive, on the caller's thread.
 class Observer {
  public:
   virtual ~Observer() = default;
-  // State `step` of the bodies that this world produced there (see "producer" in docs/architecture.md), contact records
-  // included. Called once for state 0 (with the world's own bodies) and once for each step computed.
-  virtual void computed(Step /*step*/, const BodySet& /*produced*/) {}
-  // The same state has become final: called once for each step from 0 on, in order. `hash` is bodies_hash(produced).
-  virtual void finalised(Step /*step*/, const BodySet& /*produced*/, std::uint64_t /*hash*/) {}
+  // State `step` of the bodies that this world produced there (see "producer" in docs/architecture.md) has become
+  // final: called once for each step from 0 on, in order.
+  virtual void finalised(Step /*step*/, const Produced& /*produced*/) {}
 };
 
 struct Outgoing {
@@ -94,12 +113,21 @@ class WorldCore {
   std::vector<Outgoing> take_outgoing();
 
   Step clock() const;       // newest step computed
+  Step front() const;       // everything up to this step is computed, and nothing of it is to be done again
   Step final_step() const;  // newest step that can never change
   const std::vector<WorldId>& neighbours() const;
   std::vector<WorldId> waiting_for() const;  // neighbours whose messages the next piece of work lacks
+  std::string why_not_final() const;         // what the next final step lacks, in words, for logs
   std::size_t own_bodies() const;            // bodies whose centre lies in the territory at the clock
   std::size_t own_cells() const;
   const CoreStats& stats() const;
+
+  // ---- for tests
+  // Does step -> step + 1 of these bodies, and whatever that affects, again at the next work(), as if they had changed:
+  // what comes out must be what is there. `step` from final_step() to below front(); unknown bodies do nothing.
+  void touch(Step step, std::span<const BodyId> bodies);
+  // Hash of all that was produced at a step from final_step() to clock(), contact records included.
+  std::uint64_t digest(Step step) const;
 
  private:
   class Impl;

@@ -93,44 +93,53 @@ Party Stepper::party(const StaticModel& fixed) const {
           0};
 }
 
-void Stepper::place_bodies(std::span<const BodyState> bodies, std::span<const Records> previous,
-                           std::span<const std::uint8_t> roles) {
+void Stepper::assign_slots(std::span<const BodyState> bodies) {
+  for (const std::uint32_t used : slots_in_use_) slots_[used] = kStaticSlot;
+  slots_in_use_.clear();
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    const BodyModel* const m = model_.find(bodies[i].id);
+    if (!m) throw std::invalid_argument("step: body " + std::to_string(bodies[i].id) + " is not in the scene");
+    slots_in_use_.push_back(static_cast<std::uint32_t>(m - model_.bodies().data()));
+    slots_[slots_in_use_.back()] = i;
+  }
+}
+
+void Stepper::place_bodies(std::span<const BodyState> bodies, std::span<const std::uint8_t> roles) {
   const std::size_t n = bodies.size();
+  assign_slots(bodies);
   models_.resize(n);
   rotations_.resize(n);
   boxes_.resize(n);
   roles_.resize(n);
-  previous_.assign(n, {});
-  std::fill(slots_.begin(), slots_.end(), kStaticSlot);
   for (std::size_t i = 0; i < n; ++i) {
     const BodyState& state = bodies[i];
-    models_[i] = model_.find(state.id);
-    if (!models_[i]) throw std::invalid_argument("step: body " + std::to_string(state.id) + " is not in the scene");
-    slots_[static_cast<std::size_t>(models_[i] - model_.bodies().data())] = static_cast<std::uint32_t>(i);
+    models_[i] = &model_.bodies()[slots_in_use_[i]];
     rotations_[i] = state.q().toRotationMatrix();
     boxes_[i] = reach_box(state, *models_[i], rotations_[i], model_);
     roles_[i] = roles.empty() ? std::uint8_t{kRoleWanted} : roles[i];
     if (!state.asleep()) roles_[i] |= kRoleAwake;
   }
-  for (const Records& records : previous)
-    for (std::size_t first = 0, end = 0; first < records.size(); first = end) {
-      while (end < records.size() && records[end].a == records[first].a) ++end;
-      if (const std::uint32_t slot = slot_of(records[first].a); slot != kStaticSlot)
-        previous_[slot] = records.subspan(first, end - first);
-    }
 }
 
 std::size_t Stepper::find_contacts(const BodySet& set, std::span<const std::uint8_t> roles,
                                    std::vector<ContactRecord>& out) {
-  const Records previous = set.contacts;
-  return find_contacts(set.bodies, std::span(&previous, 1), roles, out);
+  split_.assign(set.bodies.size(), {});
+  const Records all = set.contacts;
+  for (std::size_t i = 0, first = 0; i < set.bodies.size(); ++i) {
+    std::size_t end = first;
+    while (end < all.size() && all[end].a == set.bodies[i].id) ++end;
+    split_[i] = all.subspan(first, end - first);
+    first = end;
+  }
+  return find_contacts(set.bodies, split_, roles, out);
 }
 
 std::size_t Stepper::find_contacts(std::span<const BodyState> bodies, std::span<const Records> previous,
                                    std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out) {
   out.clear();
   StageClock clock(timing);
-  place_bodies(bodies, previous, roles);
+  previous_ = previous;
+  place_bodies(bodies, roles);
   clock.lap(times.boxes);
   broad_.find(boxes_, roles_, broad_cell(model_), pairs_);
   clock.lap(times.broad);
@@ -190,9 +199,7 @@ void Stepper::contacts_of(std::span<const BodyState> bodies, std::uint32_t body,
 void Stepper::find_islands(std::span<const BodyState> bodies, std::span<const ContactRecord> contacts,
                            std::vector<Ends>& ends, Islands& islands) {
   StageClock clock(timing);
-  std::fill(slots_.begin(), slots_.end(), kStaticSlot);
-  for (std::uint32_t i = 0; i < bodies.size(); ++i)
-    slots_[static_cast<std::size_t>(model_.find(bodies[i].id) - model_.bodies().data())] = i;
+  assign_slots(bodies);
   ends.resize(contacts.size());
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     ends[k].a = slot_of(contacts[k].a);

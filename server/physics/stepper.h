@@ -45,9 +45,8 @@ class Stepper {
 
   // 1. The records at the poses of `bodies` (ascending by id) of all pairs that touch, into `out`: first those that
   // belong to wanted bodies, in canonical order, then those of the others, likewise. Returns how many are the former.
-  // `previous` are the records of the step before, from one or several sources, each in canonical order and each with
-  // all the records of the bodies that it has any of. `roles` (BodyRole, one per body) say which pairs are wanted;
-  // kRoleAwake is filled in here. Without roles: all pairs.
+  // `previous`: for each body the records that belong to it from the step before, in canonical order. `roles`
+  // (BodyRole, one per body) say which pairs are wanted; kRoleAwake is filled in here. Without roles: all pairs.
   using Records = std::span<const ContactRecord>;
   std::size_t find_contacts(std::span<const BodyState> bodies, std::span<const Records> previous,
                             std::span<const std::uint8_t> roles, std::vector<ContactRecord>& out);
@@ -64,14 +63,17 @@ class Stepper {
   // All three for a closed set.
   void step(BodySet& set);
 
+  // The reach boxes of the bodies last given to find_contacts.
+  std::span<const Aabb> boxes() const { return boxes_; }
+
   StepCounters counters;
   const ContactCounters& contact_counters() const { return updater_.counters; }
   bool timing = false;
   StageTimes times;
 
  private:
-  void place_bodies(std::span<const BodyState> bodies, std::span<const Records> previous,
-                    std::span<const std::uint8_t> roles);
+  void assign_slots(std::span<const BodyState> bodies);
+  void place_bodies(std::span<const BodyState> bodies, std::span<const std::uint8_t> roles);
   void contacts_of(std::span<const BodyState> bodies, std::uint32_t body, std::vector<ContactRecord>& out);
   Party party(const BodyState& state, std::uint32_t slot) const;
   Party party(const StaticModel& fixed) const;
@@ -91,10 +93,12 @@ class Stepper {
   std::vector<Mat3> rotations_;
   std::vector<Aabb> boxes_;
   std::vector<std::uint8_t> roles_;
-  std::vector<Records> previous_;
+  std::span<const Records> previous_;
+  std::vector<Records> split_;
   Pairs pairs_;
   std::vector<std::uint32_t> near_statics_;
   std::vector<std::uint32_t> slots_;  // by position in Model::bodies()
+  std::vector<std::uint32_t> slots_in_use_;
   std::vector<Vec3> centres_;
   std::vector<Surface> surfaces_;
   std::vector<std::uint32_t> island_slot_, all_, sorted_;

@@ -48,8 +48,9 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core.me = settings.me;
   core.epoch = settings.epoch;
   core.session = settings.instance;
-  core.session = settings.instance;
   core.last_step = settings.last_step;
+  core.sync = settings.sync;
+  core.window = settings.window;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
   lines_.resize(core_->neighbours().size());
@@ -131,6 +132,7 @@ wire::Status Daemon::status() const {
   s.pid(static_cast<std::uint32_t>(getpid()));
   s.clock(std::max<Step>(0, core_->clock()));  // below 0 before state 0 is known
   s.final_step(std::max<Step>(0, core_->final_step()));
+  s.front(std::max<Step>(0, core_->front()));
   s.bodies(core_->own_bodies());
   s.cells(core_->own_cells());
   s.neighbours(static_cast<std::uint32_t>(core_->neighbours().size()));
@@ -152,6 +154,11 @@ wire::Status Daemon::status() const {
   s.refused(stats.refused);
   s.clamped(stats.clamped);
   s.non_finite(stats.non_finite);
+  s.anticipated(stats.anticipated);
+  s.bodies_computed(stats.timeline.bodies_computed);
+  s.bodies_redone(stats.timeline.bodies_redone);
+  s.rollbacks(stats.timeline.steps_redone);
+  s.longest_rollback(stats.timeline.longest_rollback);
   s.interruptions(interruptions_);
   s.work_seconds(seconds(working_));
   s.waiting_seconds(seconds(waiting_));

@@ -26,6 +26,7 @@ struct DaemonSettings {
   WorldId worlds = 1;
   std::uint32_t epoch = 0;
   Step last_step = 0;
+  border::Sync sync = border::Sync::kAnticipative;
   Step window = 48;                      // K
   Step dump_first = -1, dump_last = -1;  // states to report; -1: none
 };

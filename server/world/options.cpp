@@ -46,7 +46,7 @@ void check(const Options& o) {
   if (o.world == 0 && !has_scene) throw std::invalid_argument("--scene: world 0 needs one");
   if (o.world != 0 && has_scene)
     throw std::invalid_argument("--scene: only world 0 has one; the others get it from there");
-  if (o.single && (o.world != 0 || o.worlds != 1))
+  if (o.sync == SyncMode::kSingle && (o.world != 0 || o.worlds != 1))
     throw std::invalid_argument("--sync single: there is only one world then");
   if (o.world == 0 && o.dump_last > o.steps) throw std::invalid_argument("--dump-steps: beyond the last step");
 }
@@ -55,7 +55,7 @@ void check(const Options& o) {
 
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   Options o;
-  std::string sync = "conservative", pace = "realtime", dump, expect;
+  std::string sync = "anticipative", pace = "realtime", dump, expect;
   CLI::App app(kAbout, "soda-world");
   app.footer(kByHand);
   app.set_version_flag("--version", std::string("soda ") + kVersion + ", protocol " + std::to_string(kProtocolVersion));
@@ -71,8 +71,10 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       ->check(CLI::Range(1u, dds::kMaxWorlds))
       ->capture_default_str()
       ->group(group);
-  app.add_option("--sync", sync, "'conservative', or 'single': one world and no network, the reference")
-      ->check(CLI::IsMember({"single", "conservative"}))
+  app.add_option("--sync", sync,
+                 "'anticipative': worlds run ahead and repair; 'conservative': they wait for each other; 'single': one "
+                 "world and no network, the reference")
+      ->check(CLI::IsMember(sync_names()))
       ->capture_default_str()
       ->group(group);
   app.add_option("--steps", o.steps, "the run ends when this step is final")
@@ -82,8 +84,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.add_option("--pace", pace, "'realtime', 'max' (as fast as possible), or a multiple of real time")
       ->capture_default_str()
       ->group(group);
-  app.add_option("--window", o.window, "steps that a world may be ahead of the displayed step")
-      ->check(CLI::Range(Step{1}, Step{100000}))
+  app.add_option("--anticipation", o.window, "K: steps beyond the final one that a world may compute")
+      ->check(CLI::Range(Step{1}, kLargestWindow))
       ->capture_default_str()
       ->group(group);
   app.add_option("--dump-steps", dump, "A[:B]: report the whole states of these steps")->group(group);
@@ -96,7 +98,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.add_option("--pretend-protocol", o.protocol)->group(hidden);
   try {
     app.parse(argc, argv);
-    o.single = sync == "single";
+    o.sync = parse_sync(sync);
     o.pace = parse_pace(pace);
     if (!expect.empty()) o.expect_scene = parse_hash(expect);
     if (!dump.empty()) std::tie(o.dump_first, o.dump_last) = parse_steps(dump);

@@ -22,7 +22,7 @@ struct Options {
   // Of world 0, which tells the others.
   std::string scene;  // file
   WorldId worlds = 1;
-  bool single = false;  // no network
+  SyncMode sync = SyncMode::kAnticipative;
   Step steps = kDefaultSteps;
   double pace = 1;  // multiple of real time; 0: as fast as possible
   Step window = kDefaultWindow;

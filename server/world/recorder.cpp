@@ -39,16 +39,16 @@ Recorder::Recorder(std::uint64_t instance, WorldId me, double dt, Step dump_firs
   batch_.world(me);
 }
 
-void Recorder::finalised(Step step, const BodySet& produced, std::uint64_t hash) {
+void Recorder::finalised(Step step, const border::Produced& produced) {
   if (batch_.hashes().empty()) {
     batch_.first(step);
     batch_since_ = Clock::now();
   }
-  batch_.bodies().push_back(static_cast<std::uint32_t>(produced.bodies.size()));
-  batch_.hashes().push_back(hash);
+  batch_.bodies().push_back(static_cast<std::uint32_t>(produced.bodies()));
+  batch_.hashes().push_back(produced.hash());
   if (batch_.hashes().size() >= kBatchSteps) flush();
-  if (dump_first_ >= 0 && step >= dump_first_ && step <= dump_last_) report_state(step, produced);
-  if (reports_.wants_transforms()) report_transforms(step, produced);
+  if (dump_first_ >= 0 && step >= dump_first_ && step <= dump_last_) report_state(step, produced.all());
+  if (reports_.wants_transforms()) report_transforms(step, produced.all());
 }
 
 void Recorder::flush_if_due(Clock::time_point now) {

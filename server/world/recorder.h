@@ -16,7 +16,7 @@ class Recorder final : public border::Observer {
   // States of steps dump_first .. dump_last are reported; -1: none.
   Recorder(std::uint64_t instance, WorldId me, double dt, Step dump_first, Step dump_last, Reports& reports);
 
-  void finalised(Step step, const BodySet& produced, std::uint64_t hash) override;
+  void finalised(Step step, const border::Produced& produced) override;
 
   // Sends the digests gathered if they are many or old.
   void flush_if_due(Clock::time_point now);

@@ -81,7 +81,7 @@ wire::Session describe(const Options& options, const EncodedScene& scene) {
   s.scene_bytes(scene.bytes.size());
   s.worlds(options.worlds);
   s.last_step(options.steps);
-  s.sync(options.single ? wire::SYNC_SINGLE : wire::SYNC_CONSERVATIVE);
+  s.sync(static_cast<std::uint8_t>(options.sync));
   s.window(static_cast<std::uint32_t>(options.window));
   s.dt(scene.scene.dt);
   s.pace(options.pace);
@@ -97,6 +97,7 @@ DaemonSettings settings_of(const wire::Session& session, const Options& options)
   settings.worlds = session.worlds();
   settings.epoch = options.epoch;
   settings.last_step = session.last_step();
+  settings.sync = session.sync() == wire::SYNC_ANTICIPATIVE ? border::Sync::kAnticipative : border::Sync::kConservative;
   settings.window = session.window();
   settings.dump_first = session.dump_first();
   settings.dump_last = session.dump_last();
@@ -260,7 +261,7 @@ int run_guest(const Options& options, StopSignals& signals) {
 
 int run_world(const Options& options, StopSignals& signals) {
   try {
-    if (options.single) return run_single(options, signals);
+    if (options.sync == SyncMode::kSingle) return run_single(options, signals);
     return options.world == 0 ? run_host(options, signals) : run_guest(options, signals);
   } catch (const Refused& e) {
     spdlog::error("{}", e.what());

@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "common/version.h"
 #include "tests/distributed/session.h"
 
 namespace soda::test {
@@ -88,7 +89,7 @@ TEST_F(Failure, CtrlCEndsEverythingAndKeepsWhatThereIs) {
 }
 
 TEST_F(Failure, DaemonsEndWhenTheCommandIsKilled) {
-  for (const char* const sync : {"single", "conservative"}) {
+  for (const char* const sync : {"single", "conservative", "anticipative"}) {
     Program session(soda({"run", scene("cubes", 300), "--worlds", "2", "--sync", sync, "--steps", "100000", "-q"}),
                     directory());
     const auto daemons = daemons_of(session, sync == std::string("single") ? 1 : 2);
@@ -111,7 +112,9 @@ TEST_F(Failure, AnotherProtocolVersionIsRefusedByBothSides) {
                directory());
   Program stranger(soda_world({"--session", session, "--world", "1", "--pretend-protocol", "77"}), directory());
   expect_exit(stranger, 3, 30s);
-  EXPECT_NE(stranger.output().find("speaks protocol version 1 and this daemon version 77"), std::string::npos)
+  EXPECT_NE(stranger.output().find("speaks protocol version " + std::to_string(kProtocolVersion) +
+                                   " and this daemon version 77"),
+            std::string::npos)
       << stranger.output();
   EXPECT_TRUE(host.wrote("refused a daemon that wants to join: it speaks protocol version 77", 10s)) << host.output();
 

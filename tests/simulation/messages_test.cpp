@@ -6,8 +6,8 @@
 #include <random>
 
 #include "server/border/codec.h"
+#include "server/border/frame_book.h"
 #include "server/border/link.h"
-#include "server/border/near_sets.h"
 #include "server/physics/stepper.h"
 #include "tests/simulation/scenes.h"
 #include "tests/simulation/simulated_session.h"
@@ -39,8 +39,11 @@ class Messages : public testing::Test {
                        .durable = 0};
     message_.frames.push_back({120, {1, 0}, set});
     border::Component component{set, {{set.bodies[3].id, 2, 99}, {set.bodies[5].id, 0, 98}}};
-    message_.parts.push_back(
-        {.origin = 1, .step = 120, .through = 120, .revision = {1, 0}, .final = true, .components = {component, {}}});
+    message_.parts.push_back({.origin = 1,
+                              .step = 120,
+                              .revision = {1, 0},
+                              .components = {std::make_shared<const border::Component>(component),
+                                             std::make_shared<const border::Component>()}});
   }
 
   physics::Model model_;
@@ -54,9 +57,9 @@ TEST_F(Messages, ComeBackBitForBit) {
   EXPECT_EQ(back.header.final_step, 119);
   EXPECT_TRUE(back.header.need);
   ASSERT_EQ(back.frames.size(), 1u);
-  EXPECT_TRUE(border::same(back.frames[0].set, message_.frames[0].set));
+  EXPECT_TRUE(same(back.frames[0].set, message_.frames[0].set));
   ASSERT_EQ(back.parts[0].components.size(), 2u);
-  EXPECT_EQ(back.parts[0].components[0].ports[1].record, 98u);
+  EXPECT_EQ(back.parts[0].components[0]->ports[1].record, 98u);
 }
 
 TEST_F(Messages, CutShortAnywhereAreRefused) {
@@ -138,7 +141,7 @@ TEST_F(Messages, OfOthersChangeNothing) {
   bad.header.upto = 500;
   EXPECT_NE(refusal(bad).find("cannot be"), std::string::npos);
   bad = hello;
-  bad.parts = {{.origin = 9, .step = 0, .through = 0, .revision = {}, .final = true, .components = {}}};
+  bad.parts = {{.origin = 9, .step = 0, .revision = {}, .components = {}}};
   EXPECT_NE(refusal(bad).find("origin 9"), std::string::npos);
   EXPECT_EQ(world.stats().refused, 5u);
   EXPECT_EQ(world.clock(), 0);
@@ -148,7 +151,7 @@ TEST(Link, DeliversInOrderAndRepeatsWhatWasLost) {
   border::Link out(1, 0, 1, 1), in(1, 1, 1, 0);
   const physics::Model model(hard_scene("corner").make());
   std::vector<std::vector<std::byte>> sent;
-  for (Step t = 0; t < 5; ++t) out.send(t, t - 1, sent);
+  for (Step t = 0; t < 5; ++t) out.send(t, t - 1, t - 2, sent);
   std::vector<Step> got;
   const auto deliver = [&](Message& m) { got.push_back(m.header.upto); };
   const auto give = [&](border::Link& to, const std::vector<std::byte>& bytes) {
@@ -174,28 +177,38 @@ TEST(Link, DeliversInOrderAndRepeatsWhatWasLost) {
   EXPECT_EQ(in.final_step(), 3);
 }
 
-TEST(NearSets, WithoutAFrameSleepersStayAndNobodyElse) {
-  const auto body = [](BodyId id, bool asleep) {
+TEST(FrameBook, TellsWhatTheOtherSideWouldNotAssume) {
+  const auto near = [](BodyId id, bool asleep) {
     BodyState b;
     b.id = id;
     if (asleep) b.flags |= kAsleep;
-    return b;
+    return border::NearBody{static_cast<timeline::Slot>(id), timeline::make_record(b, {}, {}, 0), {}};
   };
-  ContactRecord of_sleeper, of_awake;
-  of_sleeper.a = 1, of_sleeper.b = 2, of_awake.a = 3, of_awake.b = kStaticBit | 9;
-  const BodySet now{{body(1, true), body(2, true), body(3, false)}, {of_sleeper, of_awake}};
-  border::ToldBodies told;
-  border::HeardBodies heard;
-  EXPECT_TRUE(told.must_tell(now));
-  heard.hear(0, now);
-  bool was_told = false;
-  EXPECT_TRUE(border::same(heard.at(0, was_told), now));
-  EXPECT_TRUE(was_told);
-  const BodySet sleepers{{body(1, true), body(2, true)}, {of_sleeper}};
-  EXPECT_FALSE(told.must_tell(sleepers)) << "the other side assumes just this";
-  EXPECT_TRUE(border::same(heard.at(1, was_told), sleepers));
-  EXPECT_FALSE(was_told);
-  EXPECT_TRUE(told.must_tell({})) << "to take sleepers back, a frame is needed";
+  const auto ids = [](const BodySet& set) {
+    std::vector<BodyId> all;
+    for (const BodyState& b : set.bodies) all.push_back(b.id);
+    return all;
+  };
+  const border::NearBody one = near(1, true), two = near(2, true), three = near(3, false);
+  border::FrameBook book;
+  book.extend();
+  book.set(0, {one, two, three});
+  std::vector<border::Frame> frames = book.tell(0, 1);
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(ids(frames[0].set), (std::vector<BodyId>{1, 2, 3}));
+  for (int i = 0; i < 3; ++i) book.extend();
+  for (Step t = 1; t <= 3; ++t) book.set(t, {one, two});
+  EXPECT_TRUE(book.tell(3, 1).empty()) << "the other side assumes just this: sleepers stay, nobody else";
+  book.set(2, {});
+  frames = book.tell(3, 1);
+  ASSERT_EQ(frames.size(), 2u) << "taken back at 2, so step 3, which was assumed from it, must be told";
+  EXPECT_TRUE(frames[0].step == 2 && frames[0].set.bodies.empty());
+  EXPECT_TRUE(frames[1].step == 3 && ids(frames[1].set) == (std::vector<BodyId>{1, 2}));
+  book.set(2, {one, two});
+  frames = book.tell(3, 1);
+  ASSERT_EQ(frames.size(), 1u) << "only what was told may be told again, even where it is what was assumed";
+  EXPECT_EQ(frames[0].step, 2);
+  EXPECT_GT(frames[0].revision, (border::Revision{1, 1}));
 }
 
 }  // namespace

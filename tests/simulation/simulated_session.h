@@ -19,23 +19,29 @@ struct StepDigest {
 };
 
 struct NetworkSettings {
+  border::Sync sync = border::Sync::kAnticipative;
+  Step window = 48;
   std::uint64_t seed = 1;
   int delay = 5;               // ticks, at most, for an ordinary message
   double slow_share = 0.05;    // of messages that take up to ten times as long: reordering
   double double_share = 0.05;  // of messages that arrive twice
   double loss_share = 0;       // of messages that never arrive; the sender is told nothing
   double stall_share = 0.5;    // of ticks in which a world does nothing
+  double touch_share = 0;      // of ticks in which a world at rest repairs a random step where nothing has changed
 };
 
 struct SessionResult {
   std::vector<StepDigest> steps;  // summed over the worlds, by step
   border::CoreStats total;        // likewise
-  std::uint64_t lost = 0, doubled = 0, delivered = 0;
+  std::uint64_t lost = 0, doubled = 0, delivered = 0, touched = 0;
   std::size_t least_neighbours = 0;
   std::string failure;  // empty: all worlds made the last step final
 };
 
-// The reference: one world, no network.
+// Adds what may be added up; of the longest, the longer.
+void add(border::CoreStats& sum, const border::CoreStats& s);
+
+// The reference: the step alone, again and again.
 std::vector<StepDigest> run_single(const Scene& scene, Step steps);
 
 // The session on `worlds` worlds. `owner` overrides the territories (by Grid::index) where not empty.

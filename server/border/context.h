@@ -1,0 +1,39 @@
+// What the pieces of one world's protocol have in common.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "server/border/link.h"
+#include "server/border/neighbourhood.h"
+#include "server/border/world_core.h"
+#include "server/timeline/timeline.h"
+
+namespace soda::border {
+
+struct Context {
+  const physics::Model& model;
+  const CoreSettings& settings;
+  const Neighbourhood& neighbourhood;
+  timeline::Timeline& timeline;
+  std::vector<Link>& links;
+  CoreStats& stats;
+  const Step& final_step;
+
+  Link* link_to(WorldId world) const {
+    for (Link& link : links)
+      if (link.peer() == world) return &link;
+    return nullptr;
+  }
+  std::size_t index_of(const Link& link) const { return static_cast<std::size_t>(&link - links.data()); }
+  bool all_have_reached(Step step) const {
+    return std::all_of(links.begin(), links.end(), [&](const Link& link) { return link.upto() >= step; });
+  }
+  // State `step` is final here and with every neighbour: nothing that is known of it can change.
+  bool near_final(Step step) const {
+    return final_step >= step &&
+           std::all_of(links.begin(), links.end(), [&](const Link& link) { return link.final_step() >= step; });
+  }
+};
+
+}  // namespace soda::border

@@ -1,0 +1,61 @@
+// One step's islands that others have a share in, or that must wait, and the parts of all worlds about them.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "server/border/mixed_islands.h"
+#include "server/timeline/timeline.h"
+
+namespace soda::border {
+
+struct KeptIsland {
+  enum class State {
+    kOpen,         // it waits: for parts, or for news of those who may touch it
+    kUnconfirmed,  // nothing of it that is known here has changed since the step before, nor then its result; parts
+                   // must confirm
+    kSolved,
+  };
+  timeline::Ref<timeline::Island> island;
+  std::shared_ptr<const Component> component;
+  std::vector<Aabb> boxes;  // reach boxes of its own bodies
+  bool shared = false;      // has foreign or wide bodies
+  State state = State::kOpen;
+  std::uint32_t index = 0;      // of its component in this world's part
+  std::uint64_t content = 0;    // of the closure that it was solved with
+  std::vector<WorldId> worlds;  // whose parts were used
+};
+
+struct Exchange {
+  explicit Exchange(const Neighbourhood& neighbourhood, std::size_t links) : parts(neighbourhood), told(links) {}
+
+  std::vector<KeptIsland> kept;
+  bool retry = false;      // something has come since islands were last tried
+  bool part_due = true;    // this world's part may not be what was told
+  bool finals_due = true;  // parts that were passed on may have become final
+  bool part_stale = true;  // this world's part in `parts` may not be that of `kept`
+
+  MixedIslands parts;  // of all origins, this world included
+  std::uint32_t revisions = 0;
+  std::uint64_t part_content = 0;
+  std::vector<std::optional<std::uint64_t>> told;  // by link: the content of the part that it was told
+  struct Passed {
+    Revision revision;
+    bool final = false;
+  };
+  std::map<std::pair<WorldId, WorldId>, Passed> passed;  // (to, origin)
+  std::set<WorldId> direct;                              // origins that told their parts themselves
+  std::map<WorldId, Revision> finals;                    // told to be final by others
+
+  // Makes this world's part out of the islands kept, if they have changed.
+  void refresh_part(WorldId me, std::uint32_t epoch, Step step);
+  bool open() const;      // whether results are lacking
+  bool unsolved() const;  // whether results are lacking, or unconfirmed
+};
+
+}  // namespace soda::border

@@ -1,0 +1,51 @@
+// What one neighbour holds of this world's bodies, step by step, and what it should hold: finds what must be told.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "server/border/message.h"
+#include "server/timeline/timeline.h"
+
+namespace soda::border {
+
+// A body that a neighbour owns or has near, with those of its contact records that can matter to it.
+struct NearBody {
+  timeline::Slot slot = 0;
+  timeline::Ref<timeline::Record> record;
+  std::vector<bool> wanted;  // contact records, by position; empty: all
+};
+using NearBodies = std::vector<NearBody>;  // ascending by slot
+
+class FrameBook {
+ public:
+  // The list at step `newest` + 1 is that of the step before, until set() says otherwise. The first step is 0.
+  void extend();
+  const NearBodies& truth(Step step) const { return *at(step).truth; }
+  void set(Step step, NearBodies truth);
+
+  // Everything up to `upto` that the neighbour does not hold, by what it was told and by the rule for what it was not:
+  // sleeping bodies stay, awake ones are gone.
+  std::vector<Frame> tell(Step upto, std::uint32_t epoch);
+
+  void release_before(Step step);
+
+ private:
+  using List = std::shared_ptr<const NearBodies>;
+  struct Entry {
+    List truth;
+    List told;   // by a frame of this step; null: none
+    List holds;  // with what follows from the step before; valid up to checked_
+    std::uint32_t revisions = 0;
+  };
+  Entry& at(Step step) { return entries_.at(static_cast<std::size_t>(step - base_)); }
+  const Entry& at(Step step) const { return entries_.at(static_cast<std::size_t>(step - base_)); }
+  std::deque<Entry> entries_;
+  Step base_ = 0;
+  Step checked_ = -1;  // up to this step the neighbour holds the truth
+};
+
+}  // namespace soda::border

@@ -1,0 +1,336 @@
+#include "server/border/settler.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "common/state_hash.h"
+
+namespace soda::border {
+
+using State = KeptIsland::State;
+
+// ---- what the timeline finds
+// -----------------------------------------------------------------------------------------
+
+void Settler::extended(Step step) {
+  Exchange next(context_.neighbourhood, context_.links.size());
+  if (!exchanges_.empty())
+    for (const KeptIsland& island : exchanges_.back().kept)
+      if (island.shared) {
+        next.kept.push_back(island);
+        next.kept.back().state = State::kUnconfirmed;
+        next.kept.back().content = 0;
+      }
+  next.retry = !next.kept.empty();
+  exchanges_.push_back(std::move(next));
+  auto parts = std::exchange(later_parts_, {});
+  for (auto& [direct, part] : parts) {
+    if (part.step != step) {
+      later_parts_.emplace_back(direct, std::move(part));
+      continue;
+    }
+    if (direct) at(step).direct.insert(part.origin);
+    at(step).parts.put(std::move(part));
+  }
+  std::erase_if(later_finals_, [&](const FinalPart& part) {
+    if (part.step == step) at(step).finals[part.origin] = part.revision;
+    return part.step <= step;
+  });
+}
+
+bool Settler::finding(Step step, bool all) {
+  Exchange& exchange = at(step);
+  if (all) exchange.kept.clear();
+  // An island that changes here may have been part of a larger one with others that are kept.
+  exchange.part_due = exchange.part_stale = exchange.retry = true;
+  find_threats(step);
+  return !threats_.empty();
+}
+
+void Settler::dropped(Step step, const timeline::Island& island) {
+  std::erase_if(at(step).kept, [&](const KeptIsland& k) { return k.island.get() == &island; });
+}
+
+void Settler::keep(Step step, timeline::Found found) {
+  Component component;
+  component.set = std::move(found.own);
+  for (const timeline::Record* const foreign : found.foreign)
+    component.ports.push_back({foreign->body.id, foreign->place.owner, record_hash(foreign->body)});
+  KeptIsland kept;
+  kept.island = std::move(found.island);
+  kept.shared = !component.ports.empty() || found.wide;
+  kept.component = std::make_shared<const Component>(std::move(component));
+  kept.boxes = std::move(found.boxes);
+  // Others' wide bodies that touch here are theirs to solve: they only have to be told.
+  kept.state = kept.component->set.bodies.empty() ? State::kUnconfirmed : State::kOpen;
+  at(step).kept.push_back(std::move(kept));
+  at(step).retry = true;
+}
+
+void Settler::find_threats(Step step) {
+  threats_.clear();
+  if (context_.settings.sync == Sync::kConservative) return;
+  const double dt = context_.model.scene().dt, margin = context_.neighbourhood.half_cell();
+  const timeline::Timeline& timeline = context_.timeline;
+  for (std::size_t l = 0; l < context_.links.size(); ++l) {
+    const Step seen = std::max(context_.links[l].upto(), timeline.oldest());
+    if (seen >= step) continue;
+    for (const timeline::NearSet::Body& b : timeline.heard(l, seen)->bodies)
+      if (!b.record->body.asleep())
+        threats_.add(physics::reach_box(b.record->body, context_.model), b.record->body.v(),
+                     static_cast<double>(step - seen) * dt, margin);
+  }
+  for (Step seen = base_; seen < step; ++seen)
+    for (const KeptIsland& island : at(seen).kept) {
+      if (island.state != State::kOpen) continue;
+      for (std::size_t i = 0; i < island.boxes.size(); ++i)
+        threats_.add(island.boxes[i], island.component->set.bodies[i].v(), static_cast<double>(step - seen) * dt,
+                     margin);
+    }
+}
+
+// ---- what others tell
+// ------------------------------------------------------------------------------------------------
+
+void Settler::part_came(const Link& from, Part part) {
+  const bool direct = part.origin == from.peer();
+  if (part.step < base_) return;  // final here
+  if (part.step >= base_ + static_cast<Step>(exchanges_.size())) {
+    later_parts_.emplace_back(direct, std::move(part));
+    return;
+  }
+  Exchange& exchange = at(part.step);
+  if (direct) exchange.direct.insert(part.origin);
+  if (exchange.parts.put(std::move(part))) exchange.retry = exchange.finals_due = true;
+}
+
+void Settler::final_part_came(const FinalPart& part) {
+  if (part.step < base_) return;
+  if (part.step >= base_ + static_cast<Step>(exchanges_.size()))
+    later_finals_.push_back(part);
+  else
+    at(part.step).finals[part.origin] = part.revision, at(part.step).finals_due = true;
+}
+
+void Settler::finals_due(Step first, Step last) {
+  last = std::min(last, base_ + static_cast<Step>(exchanges_.size()) - 1);
+  for (Step step = std::max(first, base_); step <= last; ++step) at(step).finals_due = true;
+}
+
+void Settler::retry_all() {
+  for (Exchange& exchange : exchanges_) exchange.retry = exchange.retry || exchange.unsolved();
+}
+
+// ---- settling
+// --------------------------------------------------------------------------------------------------------
+
+BodySet Settler::solve(BodySet island) {
+  physics::Stepper& stepper = context_.timeline.stepper();
+  stepper.find_islands(island.bodies, island.contacts, ends_, islands_);
+  all_.resize(islands_.size());
+  std::iota(all_.begin(), all_.end(), 0u);
+  stepper.solve(island.bodies, island.contacts, ends_, islands_, all_);
+  return island;
+}
+
+bool Settler::try_settle(Step step, const std::function<void(const BodySet&)>& settle) {
+  Exchange& exchange = at(step);
+  if (!std::exchange(exchange.retry, false)) return false;
+  exchange.refresh_part(context_.settings.me, context_.settings.epoch, step);
+  bool threats_known = false, any = false;
+  BodySet alone;
+  for (KeptIsland& island : exchange.kept) {
+    if (island.state == State::kOpen) {
+      if (!std::exchange(threats_known, true)) find_threats(step);
+      if (threats_.meet(island.boxes)) continue;
+    }
+    if (island.shared) {
+      any = try_shared(step, island, settle) || any;
+    } else if (island.state == State::kOpen) {
+      const BodySet& set = island.component->set;
+      alone.bodies.insert(alone.bodies.end(), set.bodies.begin(), set.bodies.end());
+      alone.contacts.insert(alone.contacts.end(), set.contacts.begin(), set.contacts.end());
+      island.state = State::kSolved;
+      any = true;
+    }
+  }
+  if (!alone.bodies.empty()) {
+    std::sort(alone.bodies.begin(), alone.bodies.end(),
+              [](const BodyState& l, const BodyState& r) { return l.id < r.id; });
+    std::sort(alone.contacts.begin(), alone.contacts.end(), record_before);
+    settle(solve(std::move(alone)));
+  }
+  return any;
+}
+
+bool Settler::try_shared(Step step, KeptIsland& island, const std::function<void(const BodySet&)>& settle) {
+  Exchange& exchange = at(step);
+  MixedIslands::Closure closure = exchange.parts.close({context_.settings.me, island.index});
+  pass_on(step, closure);
+  std::optional<BodySet> whole;
+  if (closure.missing.empty()) {
+    if (island.state == State::kSolved && island.content == closure.content) return false;
+    // A part may come before its world's bodies (passed on by others), or be that of a world which has fallen back.
+    const bool all_there = std::all_of(closure.worlds.begin(), closure.worlds.end(), [&](WorldId w) {
+      const Link* const link = context_.link_to(w);
+      return !link || link->upto() >= step;
+    });
+    if (all_there) whole = exchange.parts.assemble(closure, closure.misfit);
+  }
+  if (!closure.misfit.empty() && context_.near_final(step) &&
+      std::all_of(closure.worlds.begin(), closure.worlds.end(), [&](WorldId w) { return part_is_final(step, w); }))
+    throw ProtocolError("step " + std::to_string(step) + ": " + closure.misfit);
+  if (!whole) {
+    if (island.state == State::kSolved) island.state = State::kOpen;
+    return false;
+  }
+  std::vector<BodyId> own;
+  for (KeptIsland& other : exchange.kept) {
+    if (!other.shared || !std::binary_search(closure.components.begin(), closure.components.end(),
+                                             MixedIslands::Key{context_.settings.me, other.index}))
+      continue;
+    other.state = State::kSolved;
+    other.content = closure.content;
+    other.worlds = closure.worlds;
+    for (const BodyState& body : other.component->set.bodies) own.push_back(body.id);
+  }
+  if (own.empty()) return true;  // two foreign wide bodies that touch here: others solve it
+  std::sort(own.begin(), own.end());
+  const BodySet solved = solve(std::move(*whole));
+  BodySet results;
+  const auto is_own = [&](BodyId id) { return std::binary_search(own.begin(), own.end(), id); };
+  for (const BodyState& body : solved.bodies)
+    if (is_own(body.id)) results.bodies.push_back(body);
+  for (const ContactRecord& record : solved.contacts)
+    if (is_own(record.a)) results.contacts.push_back(record);
+  settle(results);
+  return true;
+}
+
+// ---- what is told
+// ----------------------------------------------------------------------------------------------------
+
+// What is used here of other worlds goes on to those that share the island, so that all parts reach all its worlds.
+void Settler::pass_on(Step step, const MixedIslands::Closure& closure) {
+  if (closure.worlds.size() + closure.missing.size() <= 2) return;
+  Exchange& exchange = at(step);
+  const auto shares = [&](WorldId world) {
+    return std::binary_search(closure.worlds.begin(), closure.worlds.end(), world) ||
+           std::binary_search(closure.missing.begin(), closure.missing.end(), world);
+  };
+  for (const WorldId to : hearers(step)) {
+    Link* const link = context_.link_to(to);
+    if (!link || !shares(to)) continue;
+    for (const WorldId origin : closure.worlds) {
+      if (origin == context_.settings.me || origin == to) continue;
+      const Part& part = *exchange.parts.find(origin);
+      const auto [passed, first] = exchange.passed.try_emplace({to, origin});
+      if (!first && passed->second.revision == part.revision) continue;
+      passed->second = {part.revision, false};
+      exchange.finals_due = true;
+      link->add(part);
+      ++context_.stats.parts_sent;
+    }
+  }
+}
+
+std::set<WorldId> Settler::hearers(Step step) const {
+  std::set<WorldId> worlds;
+  std::vector<WorldId> reached;
+  for (const KeptIsland& island : at(step).kept) {
+    if (!island.shared) continue;
+    for (const Port& port : island.component->ports) worlds.insert(port.owner);
+    for (const BodyState& body : island.component->set.bodies) {
+      if (!context_.neighbourhood.is_wide(body)) continue;
+      context_.neighbourhood.reached(body, reached);  // whoever it reaches must say what touches it there
+      worlds.insert(reached.begin(), reached.end());
+    }
+  }
+  context_.timeline.for_each_foreign_wide(step, [&](timeline::Slot, const timeline::Record& record) {
+    context_.neighbourhood.reached(record.body, reached);
+    if (std::binary_search(reached.begin(), reached.end(), context_.settings.me)) worlds.insert(record.place.owner);
+  });
+  worlds.erase(context_.settings.me);
+  return worlds;
+}
+
+void Settler::tell(Step step) {
+  Exchange& exchange = at(step);
+  if (std::exchange(exchange.part_due, false)) {
+    exchange.refresh_part(context_.settings.me, context_.settings.epoch, step);
+    const std::set<WorldId> to = hearers(step);
+    for (std::size_t l = 0; l < context_.links.size(); ++l) {
+      std::optional<std::uint64_t>& told = exchange.told[l];
+      if (told ? *told == exchange.part_content : !to.contains(context_.links[l].peer())) continue;
+      told = exchange.part_content;
+      context_.links[l].add(*exchange.parts.find(context_.settings.me));
+      ++context_.stats.parts_sent;
+    }
+  }
+  if (!std::exchange(exchange.finals_due, false)) return;
+  for (auto& [key, passed] : exchange.passed) {
+    if (passed.final || exchange.parts.find(key.second)->revision != passed.revision ||
+        !part_is_final(step, key.second))
+      continue;
+    passed.final = true;
+    context_.link_to(key.first)->add(FinalPart{key.second, step, passed.revision});
+  }
+}
+
+bool Settler::part_is_final(Step step, WorldId origin) const {
+  if (origin == context_.settings.me) return true;
+  const Exchange& exchange = at(step);
+  const Part* const part = exchange.parts.find(origin);
+  if (!part) return false;
+  if (exchange.direct.contains(origin))
+    if (const Link* link = context_.link_to(origin)) return link->near_final() >= step;
+  const auto told = exchange.finals.find(origin);
+  return told != exchange.finals.end() && told->second == part->revision;
+}
+
+bool Settler::all_final(Step step) const {
+  const Exchange& exchange = at(step);
+  return !exchange.retry && std::all_of(exchange.kept.begin(), exchange.kept.end(), [&](const KeptIsland& island) {
+    return island.state == State::kSolved &&
+           std::all_of(island.worlds.begin(), island.worlds.end(), [&](WorldId w) { return part_is_final(step, w); });
+  });
+}
+
+std::string Settler::why_not_final(Step step) const {
+  const Exchange& exchange = at(step);
+  std::string text = exchange.retry ? "islands to be tried; " : "";
+  for (const KeptIsland& island : exchange.kept) {
+    const MixedIslands::Closure closure =
+        island.shared ? exchange.parts.close({context_.settings.me, island.index}) : MixedIslands::Closure{};
+    text += "island of";
+    for (const timeline::Slot slot : island.island->own) text += " " + std::to_string(context_.model.bodies()[slot].id);
+    text += " with";
+    for (const timeline::Slot slot : island.island->foreign)
+      text += " " + std::to_string(context_.model.bodies()[slot].id);
+    text += island.state == State::kSolved ? ": solved" : island.state == State::kOpen ? ": open" : ": unconfirmed";
+    for (const WorldId world : closure.missing) text += ", lacks " + std::to_string(world);
+    if (!closure.misfit.empty()) text += " (" + closure.misfit + ")";
+    for (const WorldId world : closure.worlds)
+      if (!part_is_final(step, world)) text += ", not final: part of " + std::to_string(world);
+    text += "; ";
+  }
+  return text;
+}
+
+void Settler::count(Step step) {
+  std::set<std::uint64_t> mixed;
+  for (const KeptIsland& island : at(step).kept)
+    if (island.worlds.size() > 1 && !island.component->set.bodies.empty()) mixed.insert(island.content);
+  context_.stats.mixed_islands += mixed.size();
+  const auto& told = at(step).told;
+  context_.stats.syncs += std::any_of(told.begin(), told.end(), [](const auto& t) { return t.has_value(); });
+}
+
+void Settler::release_before(Step step) {
+  while (base_ < step) {
+    exchanges_.pop_front();
+    ++base_;
+  }
+}
+
+}  // namespace soda::border

@@ -1,0 +1,224 @@
+// The circular buffer of a world's states, and the one operation that both advances and repairs them.
+//
+// Entry t holds what the world knows of step t: the bodies that it produced there, those that others told it of, the
+// islands found at t, and the bodies that are `pending`: whose step t -> t + 1 is still to be done, or to be done
+// again. A new entry starts as a copy of the one before it, which shares all its memory: what nothing pending touches
+// moves on unchanged. Whatever arrives or is computed for t is stored; bodies whose record appears, differs or vanishes
+// join pending(t). So the cost of an entry and of a repair grows with what changed in it, not with the world.
+//
+// A timeline knows physics, and nothing of networks: whom space belongs to, and which islands must wait, it asks an
+// Arbiter.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "common/body_set.h"
+#include "server/physics/stepper.h"
+#include "server/timeline/record.h"
+#include "server/timeline/spatial_index.h"
+#include "server/timeline/table.h"
+
+namespace soda::timeline {
+
+// A body by its position in Model::bodies(): ascending by id.
+using Slot = std::uint32_t;
+
+// Bodies that must be solved together at a step, as far as this world sees.
+struct Island {
+  std::uint32_t references = 0;
+  std::vector<Slot> own, foreign;  // ascending
+  friend void release(Island* island) { delete island; }
+};
+
+// Bodies that somebody else produced at a step, ascending by slot.
+struct NearSet {
+  struct Body {
+    Slot slot;
+    Ref<Record> record;
+  };
+  std::uint32_t references = 0;
+  std::vector<Body> bodies;
+  const Record* find(Slot slot) const;
+  friend void release(NearSet* set) { delete set; }
+};
+// The sleeping bodies among them: what is assumed at the step after when nothing is told. May be `set` itself.
+Ref<NearSet> sleepers(const Ref<NearSet>& set);
+// Bit for bit.
+bool same(const NearSet& l, const NearSet& r);
+
+// An island as found at a step, before it is solved.
+struct Found {
+  Ref<Island> island;
+  BodySet own;                         // its own bodies, and all its contacts, as found
+  std::vector<const Record*> foreign;  // the records of its foreign members; valid for the call only
+  std::vector<Aabb> boxes;             // reach boxes of the own bodies
+  bool wide = false;                   // an own body is wide
+  bool awake = false;                  // any body is awake
+};
+
+class Arbiter {
+ public:
+  virtual ~Arbiter() = default;
+  virtual Place place(const BodyState& body) const = 0;
+  // Entry `step` has been made, as a copy of the one before.
+  virtual void extended(Step step) = 0;
+  // A new round of finding islands at `step` begins; `all`: no island found there before stands. Returns whether any
+  // island may have to wait.
+  virtual bool finding(Step step, bool all) = 0;
+  // An island found at `step` before does not stand any more.
+  virtual void dropped(Step step, const Island& island) = 0;
+  // Whether an island of own bodies only, with these reach boxes, must wait.
+  virtual bool must_wait(Step step, std::span<const Aabb> boxes) = 0;
+  // An island that must wait, or has foreign or wide bodies: whoever is told settles it.
+  virtual void keep(Step step, Found found) = 0;
+};
+
+struct TimelineStats {
+  std::uint64_t steps = 0;             // entries advanced to
+  std::uint64_t bodies_computed = 0;   // results computed, first or again
+  std::uint64_t bodies_redone = 0;     // results that replaced other results of the same step
+  std::uint64_t steps_redone = 0;      // rounds in which there were any
+  std::uint64_t longest_rollback = 0;  // steps from a change to the clock, at most
+};
+
+class Timeline {
+ public:
+  // `model` and `arbiter` must outlive it. Entry 0 holds the scene's bodies that lie in `me`'s territory, all pending.
+  Timeline(const physics::Model& model, WorldId me, std::size_t sources, Arbiter& arbiter);
+
+  Step oldest() const { return base_; }
+  Step newest() const { return base_ + static_cast<Step>(entries_.size()) - 1; }
+
+  // `source` produced these bodies at `step`, and no others that matter here. For steps to come, too.
+  void hear(std::size_t source, Step step, Ref<NearSet> set);
+  Ref<NearSet> near_set(const BodySet& set) const;  // of bodies received
+  const Ref<NearSet>& heard(std::size_t source, Step step) const { return at(step).heard[source]; }
+
+  bool has_pending(Step step) const { return !at(step).pending.empty(); }
+  std::span<const Slot> pending(Step step) const { return at(step).pending; }
+  // Does step -> step + 1 for what is pending and what that affects, in two parts: `process` finds the islands and
+  // hands those that must wait to the arbiter; `finish` solves the others. In between, the arbiter's news may be sent,
+  // and more may be heard. Makes the entry `step + 1` if it is not there.
+  void process(Step step);
+  void finish();
+  Step unfinished() const { return unfinished_; }  // the step of a round that waits for finish(), else -1
+  // Results of own bodies of islands that the arbiter kept.
+  void settle(Step step, const BodySet& results);
+  // Does all of an entry's step again, for tests: what it finds must be what is there.
+  void touch(Step step, std::span<const Slot> slots);
+
+  const Record* known(Step step, Slot slot) const;
+  const Record* produced(Step step, Slot slot) const { return at(step).produced.get(slot); }
+  Ref<Record> share(Step step, Slot slot) const { return Ref<Record>(at(step).produced.get(slot)); }
+  bool own(const Record& record) const { return record.place.owner == me_; }
+  // What this world produced at `step`: number, sum of the hashes, and all of it.
+  std::size_t count(Step step) const { return at(step).count; }
+  std::uint64_t hash(Step step) const { return at(step).hash; }
+  BodySet all_produced(Step step) const;
+  // f(slot, record) for every wide body that is known at `step` and is not own, in no order; some twice.
+  template <typename F>
+  void for_each_foreign_wide(Step step, F&& f) const {
+    const Entry& entry = at(step);
+    for (const Slot slot : entry.departed)
+      if (const Record& record = *entry.produced.get(slot); record.place.wide) f(slot, record);
+    for (const Ref<NearSet>& heard : entry.heard)
+      for (const NearSet::Body& b : heard->bodies)
+        if (b.record->place.wide && !own(*b.record)) f(b.slot, *b.record);
+  }
+  // Bodies whose produced record at `step` changed since the last call.
+  std::vector<Slot> take_changed(Step step);
+
+  // Entries before `step` are not needed any more.
+  void release_before(Step step);
+
+  Slot slot_of(BodyId id) const;
+  physics::Stepper& stepper() { return stepper_; }
+  const physics::Model& model() const { return model_; }
+  const TimelineStats& stats() const { return stats_; }
+
+ private:
+  struct Entry {
+    Table<Record> produced;
+    Table<Island> islands;
+    std::vector<Ref<NearSet>> heard;  // by source
+    std::vector<Slot> pending, changed;
+    std::vector<Slot> departed;  // produced here, and not own any more; ascending
+    std::size_t count = 0;
+    std::uint64_t hash = 0;
+  };
+  // Marks by slot that are all taken away at once.
+  class Marks {
+   public:
+    void clear() { ++stamp_; }
+    bool add(Slot slot) {
+      if (slot >= stamps_.size()) stamps_.resize(slot + slot / 2 + 64, 0);
+      return std::exchange(stamps_[slot], stamp_) != stamp_;
+    }
+    bool has(Slot slot) const { return slot < stamps_.size() && stamps_[slot] == stamp_; }
+
+   private:
+    std::vector<std::uint64_t> stamps_;
+    std::uint64_t stamp_ = 1;
+  };
+
+  Entry& at(Step step) { return entries_.at(static_cast<std::size_t>(step - base_)); }
+  const Entry& at(Step step) const { return entries_.at(static_cast<std::size_t>(step - base_)); }
+  void extend();
+  void assume(std::size_t source, Step step);
+  void note(Slot slot, const BodyState& body, Step step);
+  void affect(Step step, Slot slot);
+  void affect_island(Step step, Slot slot);
+  void affect_touched(Step step, const Record& foreign);
+  static void set_departed(Entry& entry, Slot slot, bool departed);
+  void take_away(Step step, Slot slot);
+  void add_around(Step step, Slot slot);
+  void gather(Step step, std::size_t first_affected);
+  void gather_all(Step step);
+  void find(Step step);
+  bool concerned(std::uint32_t island) const;
+  bool grown(Step step);
+  void sort_out(Step step, bool all);
+  void keep(Step step, std::uint32_t island, Ref<Island> members);
+  void store(Step step, std::vector<Table<Record>::Item>& items);
+
+  const physics::Model& model_;
+  const WorldId me_;
+  Arbiter& arbiter_;
+  physics::Stepper stepper_;
+  SpatialIndex index_;
+  std::deque<Entry> entries_;
+  Step base_ = 0;
+  std::vector<std::map<Step, Ref<NearSet>>> told_;  // by source
+  TimelineStats stats_;
+
+  // The round at hand.
+  Step unfinished_ = -1;
+  std::vector<Slot> changed_;   // bodies whose record at the step is another than before, ascending
+  std::vector<Slot> affected_;  // own bodies to do
+  std::vector<Slot> around_;    // those, and all that may touch them, ascending
+  std::vector<Slot> candidates_;
+  Marks in_affected_, in_around_, in_old_islands_;
+  std::vector<Ref<Island>> old_islands_;
+  std::vector<BodyState> bodies_;
+  std::vector<const Record*> records_;
+  std::vector<Slot> slots_;
+  std::vector<physics::Stepper::Records> previous_;
+  std::vector<std::uint8_t> roles_;
+  std::vector<ContactRecord> contacts_;
+  std::size_t own_contacts_ = 0;
+  std::vector<physics::Ends> ends_;
+  physics::Islands islands_;
+  std::vector<std::uint32_t> solved_;     // islands
+  std::vector<std::uint8_t> has_result_;  // by position in bodies_
+  std::vector<Aabb> boxes_;
+  std::vector<Table<Record>::Item> results_;
+  std::vector<Table<Island>::Item> island_items_;
+};
+
+}  // namespace soda::timeline

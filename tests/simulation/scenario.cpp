@@ -1,0 +1,101 @@
+#include "tests/simulation/scenario.h"
+
+#include <map>
+#include <mutex>
+#include <random>
+
+#include "common/scene/scene_builder.h"
+#include "tests/simulation/scenes.h"
+
+namespace soda::test {
+
+const Reference& reference(const std::string& name) {
+  static std::mutex mutex;
+  static std::map<std::string, Reference> cache;
+  const std::lock_guard lock(mutex);
+  const auto it = cache.find(name);
+  if (it != cache.end()) return it->second;
+  const HardScene& hard = hard_scene(name);
+  Reference made{hard.make(), {}};
+  made.steps = run_single(made.scene, hard.steps);
+  return cache.emplace(name, std::move(made)).first->second;
+}
+
+NetworkSettings network_of(std::uint64_t seed) {
+  std::mt19937_64 random(seed * 7919);
+  NetworkSettings n;
+  n.seed = seed;
+  n.delay = std::vector<int>{1, 3, 15, 60}[random() % 4];
+  n.slow_share = std::vector<double>{0, 0.05, 0.4}[random() % 3];
+  n.double_share = std::vector<double>{0, 0.1}[random() % 2];
+  n.loss_share = std::vector<double>{0, 0, 0.03}[random() % 3];
+  n.stall_share = std::vector<double>{0, 0.5, 0.9}[random() % 3];
+  n.sync = random() % 4 == 0 ? border::Sync::kConservative : border::Sync::kAnticipative;
+  n.window = std::vector<Step>{48, 12, 3}[random() % 3];
+  n.touch_share = std::vector<double>{0, 0.004}[random() % 2];
+  return n;
+}
+
+std::vector<WorldId> slabs(const Scene& scene, WorldId worlds) {
+  const Grid grid = make_grid(scene);
+  if (grid.size[0] < static_cast<std::int32_t>(worlds)) return {};
+  std::vector<WorldId> owner(grid.cells());
+  for (std::size_t i = 0; i < owner.size(); ++i)
+    owner[i] = static_cast<WorldId>(i % static_cast<std::size_t>(grid.size[0]) * worlds /
+                                    static_cast<std::size_t>(grid.size[0]));
+  return owner;
+}
+
+std::vector<WorldId> confetti(const Scene& scene, WorldId worlds, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<WorldId> owner(make_grid(scene).cells());
+  for (WorldId& w : owner) w = static_cast<WorldId>(random() % worlds);
+  for (WorldId w = 0; w < worlds; ++w) owner[w] = w;
+  return owner;
+}
+
+Scenario scenario_of(std::uint64_t seed) {
+  std::mt19937_64 random(seed * 104729 + 1);
+  const auto& scenes = hard_scenes();
+  const HardScene& hard = scenes[random() % scenes.size()];
+  Scenario s;
+  s.scene = hard.name;
+  s.worlds = 2 + static_cast<WorldId>(random() % 8);
+  s.steps = hard.steps / 3 + static_cast<Step>(random() % static_cast<std::uint64_t>(hard.steps - hard.steps / 3 + 1));
+  s.network = network_of(seed);
+  const Scene& scene = reference(s.scene).scene;
+  switch (random() % 5) {
+    case 0:
+    case 1:
+      break;
+    case 2:
+      // Every body is near somebody else's: dear, so not too long.
+      s.owner = confetti(scene, s.worlds, seed);
+      s.steps = std::min<Step>(s.steps, 60);
+      break;
+    default:
+      s.owner = slabs(scene, s.worlds);
+  }
+  return s;
+}
+
+std::string Scenario::text() const {
+  const auto share = [](double x) { return std::to_string(static_cast<int>(1000 * x + 0.5)) + "/1000"; };
+  return scene + ", " + std::to_string(steps) + " steps, " + std::to_string(worlds) + " worlds, " +
+         (network.sync == border::Sync::kConservative ? "conservative" : "K " + std::to_string(network.window)) +
+         ", delay " + std::to_string(network.delay) + ", slow " + share(network.slow_share) + ", doubled " +
+         share(network.double_share) + ", lost " + share(network.loss_share) + ", stalled " +
+         share(network.stall_share) + ", touched " + share(network.touch_share);
+}
+
+SessionResult run_scenario(const Scenario& s) {
+  const Reference& expected = reference(s.scene);
+  SessionResult got = run_session(expected.scene, s.worlds, s.steps, s.network, s.owner);
+  if (!got.failure.empty()) return got;
+  const auto end = expected.steps.begin() + s.steps + 1;
+  got.failure = first_difference({expected.steps.begin(), end}, got.steps);
+  if (got.failure.empty() && got.total.refused > 0) got.failure = std::to_string(got.total.refused) + " messages refused";
+  return got;
+}
+
+}  // namespace soda::test
