@@ -119,10 +119,11 @@ bool equal_dumps(const std::filesystem::path& a, const std::filesystem::path& b)
     return false;
   }
   Step step = std::max(reader_a.header().first, reader_b.header().first);
+  const Step last = std::min(reader_a.header().last, reader_b.header().last);
   Step compared = 0;
-  for (;; ++step, ++compared) {
+  for (; step <= last; ++step, ++compared) {
     const auto in_a = next_from(reader_a, step), in_b = next_from(reader_b, step);
-    if (!in_a || !in_b) break;
+    if (!in_a || !in_b) throw DiffError((!in_a ? a : b).string() + ": ends before step " + std::to_string(step));
     if (in_a->step != step || in_b->step != step)
       throw DiffError("step " + std::to_string(step) + " is missing in " + (in_a->step != step ? a : b).string());
     const std::string found = difference(in_a->state, in_b->state);

@@ -26,6 +26,7 @@ int watch(const WatchOptions& options) {
   Collector collector(options.follow.files);
   Table table(options.follow.quiet);
   DdsSource source(options.network, options.session, !options.follow.files.dump.empty());
+  if (!options.follow.quiet) table.say("waiting for session '" + options.session + "' ...");
   Processes none([](const std::string&, const std::string&) {});
   return follow(source, none, table, signals, collector, options.follow);
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -65,6 +66,9 @@ struct Drive {
   // is turned round. No bounds: never.
   std::optional<Aabb> bounds;
 };
+
+// Of one body: contact records name a pair of shapes in 2 x 12 bits.
+constexpr std::size_t kMaxShapes = 4096;
 
 struct Body {
   BodyId id = 0;

@@ -230,6 +230,9 @@ MaybeProblem body_problem(const Scene& scene, const Body& body) {
     return p;
   if (auto p = length_in_range("angular_velocity", body.angular_velocity, kMaxSpin, " rad/s")) return p;
   if (body.shapes.empty()) return Problem{"shape", "a body needs at least one shape"};
+  if (body.shapes.size() > kMaxShapes)
+    return Problem{"shape",
+                   std::to_string(body.shapes.size()) + " shapes; a body has at most " + std::to_string(kMaxShapes)};
   for (std::size_t s = 0; s < body.shapes.size(); ++s) {
     const Shape& shape = body.shapes[s];
     const std::string field = "shape[" + std::to_string(s) + "]";

@@ -1,6 +1,7 @@
 #include "server/border/link.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 namespace soda::border {
@@ -14,7 +15,7 @@ Header Link::header(std::uint64_t sequence, bool need) const {
   h.from = me_;
   h.to = peer_;
   h.epoch = epoch_;
-  h.to_epoch = peer_epoch_;
+  h.to_epoch = peer_epoch_.value_or(0);
   h.sequence = sequence;
   h.ack = received_;
   h.need = need;
@@ -53,6 +54,8 @@ void Link::collect(std::vector<std::vector<std::byte>>& out) {
 
 void Link::receive(Message message, const std::function<void(Message&)>& deliver) {
   const Header& h = message.header;
+  if ((peer_epoch_ && *peer_epoch_ != h.epoch) || (h.sequence > 0 && h.to_epoch != 0 && h.to_epoch != epoch_))
+    throw CodecError("border message of another start of world " + std::to_string(h.from) + " or of this one");
   peer_epoch_ = h.epoch;
   const std::uint64_t logged_before = sent_ - log_.size();
   if (h.ack > logged_before && h.ack <= sent_)

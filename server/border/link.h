@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "server/border/codec.h"
@@ -35,7 +36,8 @@ class Link {
   void collect(std::vector<std::vector<std::byte>>& out);
 
   // ---- in
-  // Takes a decoded message from the peer; hands every message whose turn has come to `deliver`, in order.
+  // Takes a decoded message from the peer; hands every message whose turn has come to `deliver`, in order. Throws
+  // CodecError for one of another start of the peer, or to another start of this world.
   void receive(Message message, const std::function<void(Message&)>& deliver);
 
   // The peer's values, counted: everything said before them has been delivered.
@@ -50,7 +52,7 @@ class Link {
   std::uint64_t session_;
   WorldId me_, peer_;
   std::uint32_t epoch_;
-  std::uint32_t peer_epoch_ = 0;
+  std::optional<std::uint32_t> peer_epoch_;  // once heard of
 
   Message next_;
   Step told_upto_ = -1, told_final_ = -1, told_near_final_ = -1;

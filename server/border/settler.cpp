@@ -259,6 +259,10 @@ void Settler::tell(Step step) {
   if (std::exchange(exchange.part_due, false)) {
     exchange.refresh_part(context_.settings.me, context_.settings.epoch, step);
     const std::set<WorldId> to = hearers(step);
+    for (const WorldId world : to)
+      if (!context_.link_to(world))
+        throw ProtocolError("step " + std::to_string(step) + ": an island reaches world " + std::to_string(world) +
+                            ", which is no neighbour");
     for (std::size_t l = 0; l < context_.links.size(); ++l) {
       std::optional<std::uint64_t>& told = exchange.told[l];
       if (told ? *told == exchange.part_content : !to.contains(context_.links[l].peer())) continue;

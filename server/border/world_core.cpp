@@ -27,7 +27,7 @@ class WorldCore::Impl final : timeline::Arbiter {
         announcer_(context_),
         settler_(context_),
         timeline_(model, settings.me, links_.size(), *this) {
-    make_final(0);  // state 0 is the scene
+    final_ = 0;  // the scene
   }
 
   // ---- what comes in
@@ -69,6 +69,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   // ---- work
   // ----------------------------------------------------------------------------------------------------------
   Progress work() {
+    if (!std::exchange(begun_, true)) observer_.finalised(0, Produced(timeline_, 0));
     const bool worked = idle_ ? false : advance();
     if (worked) changed();
     if (!idle_) finalise();
@@ -292,6 +293,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   CoreStats stats_;
   std::string refusal_;
   Step final_ = -1, near_final_ = -1, limit_ = std::numeric_limits<Step>::max();
+  bool begun_ = false;
   bool idle_ = false;                  // nothing can be done before something comes
   bool untold_ = true;                 // something has changed since it was last looked at what to tell
   mutable std::optional<Step> front_;  // as long as nothing changes

@@ -45,10 +45,11 @@ struct CoreStats {
   std::uint64_t frames_sent = 0, frame_bodies_sent = 0;  // frames that held bodies, and how many
   std::uint64_t parts_sent = 0;                          // own parts and parts passed on
   std::uint64_t messages_resent = 0;
-  std::uint64_t duplicates = 0;   // messages received again, ignored
-  std::uint64_t refused = 0;      // malformed or foreign messages, and protocol errors
-  std::uint64_t clamped = 0;      // bodies slowed to the scene's largest speed, summed over steps
-  std::uint64_t non_finite = 0;   // bodies whose result was not finite and which were held, summed over steps
+  std::uint64_t duplicates = 0;  // messages received again, ignored
+  std::uint64_t refused = 0;     // malformed or foreign messages, and protocol errors
+  // Results computed here that were slowed to the scene's largest speed, or held because they were not finite: those of
+  // other worlds' bodies in mixed islands and those done again count, too.
+  std::uint64_t clamped = 0, non_finite = 0;
   std::uint64_t anticipated = 0;  // steps computed before all neighbours were known to have reached them
   timeline::TimelineStats timeline;
 };

@@ -43,7 +43,6 @@ class ContactUpdater {
 };
 
 // Which children a record is about: ContactRecord::part without the face group.
-constexpr std::uint32_t kMaxChildren = 1u << 12;  // per body
 constexpr std::uint32_t child_pair(std::uint32_t child_a, std::uint32_t child_b) {
   return child_a << 20 | child_b << 8;
 }

@@ -119,7 +119,7 @@ void fly(MovingBody& body, const StepConstants& constants) {
   body.moved = moved;
 }
 
-bool end_step(const MovingBody& body, const StepConstants& constants, BodyState& state) {
+bool end_step(MovingBody& body, const StepConstants& constants, BodyState& state) {
   if (body.model->drive) (void)drive_target(*body.model->drive, body.x, state.flags);
   state.flags &= ~std::uint32_t{kAsleep};
   const Vec3 x = body.x + body.moved;
@@ -130,6 +130,7 @@ bool end_step(const MovingBody& body, const StepConstants& constants, BodyState&
     state.quiet_steps = 0;
     return false;
   }
+  limit_speed(body, constants.max_speed);
   state.set_x(x);
   state.set_q(body.q);
   state.set_v(body.v);

@@ -49,8 +49,8 @@ void move(MovingBody& body, double h, const StepConstants& constants);
 // above.
 void fly(MovingBody& body, const StepConstants& constants);
 
-// Writes the result into `state`, with flags of the drive and the quiet counter; returns false where the result is not
-// finite: the body then keeps its pose and stops.
-bool end_step(const MovingBody& body, const StepConstants& constants, BodyState& state);
+// Writes the result into `state`, its velocity limited to max_speed whatever contacts made of it, with flags of the
+// drive and the quiet counter; returns false where the result is not finite: the body then keeps its pose and stops.
+bool end_step(MovingBody& body, const StepConstants& constants, BodyState& state);
 
 }  // namespace soda::physics

@@ -33,6 +33,12 @@ class StageClock {
   double last_;
 };
 
+void forget_impulses(ContactRecord& record) {
+  for (auto& point : record.points) point.impulse = 0;
+  for (double& component : record.friction) component = 0;
+  record.twist = 0;
+}
+
 std::vector<Aabb> static_boxes(const Model& model) {
   std::vector<Aabb> boxes;
   for (const StaticModel& s : model.statics()) boxes.push_back(s.box);
@@ -253,13 +259,18 @@ void Stepper::solve(std::span<BodyState> bodies, std::span<ContactRecord> contac
       solver_.solve(moving_, island_slot_, sorted_, ends, surfaces_, contacts);
       ++counters.islands;
     }
-    bool quiet = constants_.sleeping;
+    bool quiet = constants_.sleeping, finite = true;
     for (std::uint32_t k = 0; k < members.size(); ++k) {
       BodyState& state = bodies[members[k]];
-      if (!end_step(moving_[k], constants_, state)) ++counters.non_finite;
+      if (!end_step(moving_[k], constants_, state)) {
+        ++counters.non_finite;
+        finite = false;
+      }
       counters.clamped += moving_[k].clamped;
       quiet = quiet && state.quiet_steps >= constants_.quiet_steps_to_sleep;
     }
+    if (!finite)  // nor are the impulses that came with it
+      for (const std::uint32_t c : touching) forget_impulses(contacts[c]);
     if (quiet) {
       ++counters.fell_asleep;
       for (const std::uint32_t i : members) {

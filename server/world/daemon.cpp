@@ -210,8 +210,12 @@ Daemon::End Daemon::run() {
         report_status(wire::STATE_RUNNING, before);
       }
     }
-    const Progress progress = core_->work();
-    send_all();
+    // Before the start nobody may have been told anything: a seat may still change hands.
+    Progress progress = Progress::kWaiting;
+    if (limit_known_ >= 0) {
+      progress = core_->work();
+      send_all();
+    }
     const auto now = Clock::now();
     working_ += now - before;
     report_if_due(now);

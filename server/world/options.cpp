@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <random>
 #include <stdexcept>
 
 #include "common/dds/checks.h"
@@ -102,6 +103,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     o.pace = parse_pace(pace);
     if (!expect.empty()) o.expect_scene = parse_hash(expect);
     if (!dump.empty()) std::tie(o.dump_first, o.dump_last) = parse_steps(dump);
+    if (o.epoch == 0) o.epoch = std::random_device{}() | 1u;
     check(o);
     return o;
   } catch (const CLI::ParseError& e) {

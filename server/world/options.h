@@ -29,10 +29,10 @@ struct Options {
   Step dump_first = -1, dump_last = -1;
 
   // For those that start soda-world themselves.
-  int scene_fd = -1;      // an encoded scene instead of a file
-  int report_fd = -1;     // a pipe for the reports of --sync single
-  int supervised_by = 0;  // process whose end ends this one; 0: none
-  std::uint32_t epoch = 0;
+  int scene_fd = -1;                          // an encoded scene instead of a file
+  int report_fd = -1;                         // a pipe for the reports of --sync single
+  int supervised_by = 0;                      // process whose end ends this one; 0: none
+  std::uint32_t epoch = 0;                    // of this start; random if not given
   std::uint32_t protocol = kProtocolVersion;  // to be pretended, for tests
 };
 

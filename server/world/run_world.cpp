@@ -105,6 +105,10 @@ DaemonSettings settings_of(const wire::Session& session, const Options& options)
 }
 
 void obey(Daemon& daemon, const wire::Control& control) {
+  if (control.phase() == wire::PHASE_FAILED) {
+    spdlog::error("the session has failed; leaving it");
+    return daemon.stop();
+  }
   if (control.phase() != wire::PHASE_GATHERING) daemon.set_limit(control.limit());
   if (control.phase() == wire::PHASE_ENDED) daemon.release();
 }
@@ -206,7 +210,11 @@ class HostWatch {
           for (constexpr auto look = 100ms; !over_.load(); std::this_thread::sleep_for(look)) {
             gone = guest.host_gone() ? gone + look : 0ms;
             if (gone == 5s) spdlog::warn("world 0 of the session is gone");
-            if (gone == kWithoutHost) daemon.release();
+            if (gone == kWithoutHost) {
+              daemon.release();  // if all is done, there is nothing to wait for
+              std::this_thread::sleep_for(look);
+              daemon.stop();
+            }
           }
         }) {}
   ~HostWatch() {
@@ -250,11 +258,14 @@ int run_guest(const Options& options, StopSignals& signals) {
   DdsReports reports(participant, options.supervised_by != 0, session.dump_first() >= 0, stop);
   DdsTransport transport(participant, options.world);
   Daemon daemon(std::move(scene), settings_of(session, options), transport, reports);
+  // The guest outlives the daemon, and must not talk to it then, whatever happens.
+  struct Listening {
+    SessionGuest& guest;
+    ~Listening() { guest.listen(nullptr); }
+  } const listening{guest};
   guest.listen([&](const wire::Control& control) { obey(daemon, control); });
   const HostWatch watch(guest, daemon);
-  const int code = run(daemon, options, signals);
-  guest.listen(nullptr);
-  return code;
+  return run(daemon, options, signals);
 }
 
 }  // namespace

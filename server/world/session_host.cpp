@@ -62,8 +62,9 @@ SessionHost::~SessionHost() {
 
 void SessionHost::heard(const wire::Session& other, const dds::WriterKey& writer) {
   if (writer == session_writer_.key()) return;
-  const bool was_first = other.protocol() != session_.protocol() || other.started() < session_.started() ||
-                         (other.started() == session_.started() && other.instance() < session_.instance());
+  const bool was_first =
+      service_->gathering() && (other.protocol() != session_.protocol() || other.started() < session_.started() ||
+                                (other.started() == session_.started() && other.instance() < session_.instance()));
   if (!was_first) {
     spdlog::warn("another world 0 came to this session; it will give way");
     return;

@@ -13,6 +13,9 @@ namespace {
 
 constexpr std::chrono::milliseconds kTick{10};  // of a paced run: finer than a frame of any display
 constexpr double kLogEvery = 5;                 // s, while worlds are missing
+constexpr double kJoining = 60;                 // s that a daemon may take to load the scene and say so
+constexpr double kGone = 120;                   // s of silence after which a running world will not come back
+constexpr double kPause = 2;                    // s between two looks at the clock: this process stood still
 constexpr double kSilenceSeconds = std::chrono::duration<double>(dds::kSilence).count();
 
 double seconds_now() {
@@ -26,9 +29,11 @@ SessionService::SessionService(const wire::Session& session, std::function<void(
       publish_(std::move(publish)),
       seats_(session.worlds()),
       pacer_(session.pace() / session.dt(), session.window(), session.last_step()),
-      next_log_(seconds_now() + kLogEvery) {
+      next_log_(seconds_now() + kLogEvery),
+      looked_(seconds_now()) {
   seats_[0].nonce = session.instance();
   seats_[0].holder = "this process";
+  seats_[0].heard = seconds_now();
   thread_ = std::thread([this] { run(); });
 }
 
@@ -59,11 +64,11 @@ std::string SessionService::join(const wire::Join& claim) {
            std::to_string(seats_.size() - 1);
   Seat& seat = seats_[claim.world()];
   if (seat.nonce == claim.nonce()) return "";  // told again
-  const bool silent = seat.heard > 0 && seconds_now() - seat.heard > kSilenceSeconds;
-  if (seat.nonce != 0 && !(silent && phase_ == wire::PHASE_GATHERING))
+  if (seat.nonce != 0 && !(silent(seat, seconds_now()) && phase_ == wire::PHASE_GATHERING))
     return "world " + std::to_string(claim.world()) + " is taken already (by " + seat.holder + ")";
   seat = Seat{};
   seat.nonce = claim.nonce();
+  seat.heard = seconds_now();
   seat.holder = claim.host() + ", process " + std::to_string(claim.pid());
   const auto free = std::count_if(seats_.begin(), seats_.end(), [](const Seat& s) { return s.nonce == 0; });
   spdlog::info("world {} joined ({}); {} missing", claim.world(), seat.holder, free);
@@ -77,11 +82,44 @@ void SessionService::status(const wire::Status& status) {
     Seat& seat = seats_[status.world()];
     if (seat.nonce == 0) return;
     seat.heard = seconds_now();
+    seat.reported = true;
     seat.state = std::max(seat.state, status.state());
     seat.final_step = std::max<Step>(seat.final_step, status.final_step());
     news_ = true;
   }
   changed_.notify_one();
+}
+
+bool SessionService::gathering() const {
+  const std::lock_guard lock(mutex_);
+  return phase_ == wire::PHASE_GATHERING;
+}
+
+bool SessionService::silent(const Seat& seat, double now) const {
+  return now - seat.heard > (seat.reported ? kSilenceSeconds : kJoining);
+}
+
+bool SessionService::all(std::uint8_t state, double now) const {
+  return std::all_of(seats_.begin(), seats_.end(), [&](const Seat& s) {
+    return s.nonce != 0 && s.state >= state && (phase_ != wire::PHASE_GATHERING || !silent(s, now));
+  });
+}
+
+// What others said while this process stood still may still be on its way.
+void SessionService::excuse_own_pause(double now) {
+  const double passed = now - std::exchange(looked_, now);
+  if (passed < kPause) return;
+  for (Seat& seat : seats_) seat.heard += passed;
+}
+
+void SessionService::look_for_the_gone(double now) {
+  for (std::size_t i = 0; i < seats_.size(); ++i) {
+    const Seat& seat = seats_[i];
+    if (seat.state >= wire::STATE_DONE || now - seat.heard < kGone) continue;
+    spdlog::error("world {} ({}) has been silent for {:.0f} s; the session ends", i, seat.holder, now - seat.heard);
+    phase_ = wire::PHASE_FAILED;
+    return;
+  }
 }
 
 bool SessionService::ended() const {
@@ -96,7 +134,7 @@ void SessionService::log_missing(double now) {
   for (std::size_t i = 0; i < seats_.size(); ++i) {
     if (seats_[i].nonce == 0)
       missing += " " + std::to_string(i);
-    else if (seats_[i].state < wire::STATE_READY)
+    else if (seats_[i].state < wire::STATE_READY || silent(seats_[i], now))
       unready += " " + std::to_string(i);
   }
   if (!missing.empty()) spdlog::info("waiting for worlds to join:{}", missing);
@@ -104,15 +142,13 @@ void SessionService::log_missing(double now) {
 }
 
 wire::Control SessionService::next(double now) {
-  const auto all = [this](std::uint8_t state) {
-    return std::all_of(seats_.begin(), seats_.end(),
-                       [state](const Seat& s) { return s.nonce != 0 && s.state >= state; });
-  };
-  if (phase_ == wire::PHASE_GATHERING && all(wire::STATE_READY)) {
+  excuse_own_pause(now);
+  if (phase_ == wire::PHASE_GATHERING && all(wire::STATE_READY, now)) {
     phase_ = wire::PHASE_RUNNING;
     spdlog::info("all worlds are ready; the session starts");
   }
-  if (phase_ == wire::PHASE_RUNNING && all(wire::STATE_DONE)) phase_ = wire::PHASE_ENDED;
+  if (phase_ == wire::PHASE_RUNNING && all(wire::STATE_DONE, now)) phase_ = wire::PHASE_ENDED;
+  if (phase_ == wire::PHASE_RUNNING) look_for_the_gone(now);
   if (phase_ == wire::PHASE_GATHERING) log_missing(now);
   wire::Control control;
   control.instance(session_.instance());

@@ -26,17 +26,20 @@ class SessionService {
   SessionService& operator=(const SessionService&) = delete;
 
   // From any thread. Why the claim is refused, or "". Before the start, the seat of a daemon that has fallen silent is
-  // free for another.
+  // free for another. A world that is silent for long while the session runs ends it (PHASE_FAILED): nobody can take
+  // its place.
   std::string join(const wire::Join& claim);
   void status(const wire::Status& status);
 
   bool ended() const;
+  bool gathering() const;  // the run has not started
 
  private:
   struct Seat {
     std::uint64_t nonce = 0;  // of the daemon that holds it; 0: free
     std::string holder;       // "host, process pid", for messages
-    double heard = 0;         // s, time of the last Status; 0: none yet
+    double heard = 0;         // s, time of the last Status, or of the claim
+    bool reported = false;    // there has been a Status
     std::uint8_t state = wire::STATE_PREPARING;
     Step final_step = 0;
   };
@@ -44,6 +47,10 @@ class SessionService {
   void run();
   wire::Control next(double now);  // with the lock held
   void log_missing(double now);    // likewise
+  bool silent(const Seat& seat, double now) const;
+  bool all(std::uint8_t state, double now) const;  // whether all seats are taken and have got that far
+  void excuse_own_pause(double now);
+  void look_for_the_gone(double now);
 
   const wire::Session session_;
   const std::function<void(const wire::Control&)> publish_;
@@ -53,6 +60,7 @@ class SessionService {
   Pacer pacer_;
   std::uint8_t phase_ = wire::PHASE_GATHERING;
   double next_log_ = 0;
+  double looked_ = 0;  // s, time of the last next()
   bool news_ = false;  // since run() looked
   bool quit_ = false;
   std::thread thread_;

@@ -150,7 +150,7 @@ TEST(Wire, ImpossibleValuesAreRefused) {
   refused(good_state(), [](auto& s) { s.bodies_total(0); });
   refused(good_transforms(), [](auto& s) { s.bodies()[1].position()[2] = std::numeric_limits<double>::infinity(); });
   refused(good_border(), [](auto& s) { s.to(kMaxWorlds); });
-  refused(wire::Control(), [](auto& s) { s.phase(3); });
+  refused(wire::Control(), [](auto& s) { s.phase(4); });
   refused(wire::Status(), [](auto& s) { s.state(9); });
   refused(wire::Status(), [](auto& s) { s.final_step(5); });  // beyond the clock
 }
