@@ -26,7 +26,7 @@ constexpr Run kRuns[] = {
     {"single", "--sync single"},
     {"1", "--worlds 1"},
     {"2", "--worlds 2"},
-    {"2 conservative", "--worlds 2 --sync conservative"},
+    {"2 cons.", "--worlds 2 --sync conservative"},
 };
 
 struct Case {
@@ -104,12 +104,12 @@ void worlds(const Options& options, Headline& headline) {
     headline.add(name + ".steps_per_second_1_world", one);
     headline.add(name + ".steps_per_second_2_worlds", median(speed["2"]));
     headline.add(name + ".speedup_2_worlds", median(speed["2"]) / one);
-    headline.add(name + ".speedup_2_worlds_conservative", median(speed["2 conservative"]) / one);
+    headline.add(name + ".speedup_2_worlds_conservative", median(speed["2 cons."]) / one);
     headline.add(name + ".cpu_2_worlds_over_1", median(cpu["2"]) / median(cpu["1"]));
     std::printf(
         "\r%-7s %5u bodies, %d steps: two worlds %.2f times as fast as one (conservative %.2f; CPU time %.2f "
         "times)\n",
-        c.scene, c.bodies, steps, median(speed["2"]) / one, median(speed["2 conservative"]) / one,
+        c.scene, c.bodies, steps, median(speed["2"]) / one, median(speed["2 cons."]) / one,
         median(cpu["2"]) / median(cpu["1"]));
   }
   std::filesystem::remove_all(folder);
