@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <numeric>
 #include <random>
@@ -153,7 +154,10 @@ int run(RunOptions& options) {
   StopSignals signals;
   std::unique_ptr<Descriptor> scene_fd;
   {
+    // An import can take long, and knows no signals; nothing has been started yet that would have to be ended.
+    signals.on_stop([&] { std::_Exit(128 + signals.received()); });
     const Scene scene = load(options);
+    signals.on_stop(nullptr);
     (void)bisect(scene, make_grid(scene), options.worlds);  // says so now if there are more worlds than cells
     scene_fd = in_memory(encode_scene(scene));
   }
