@@ -34,6 +34,11 @@ bool Exchange::open() const {
   return std::any_of(kept.begin(), kept.end(), [](const KeptIsland& k) { return k.state == KeptIsland::State::kOpen; });
 }
 
+bool Exchange::held() const {
+  return std::any_of(kept.begin(), kept.end(),
+                     [](const KeptIsland& k) { return k.state == KeptIsland::State::kOpen && !k.shared; });
+}
+
 bool Exchange::unsolved() const {
   return std::any_of(kept.begin(), kept.end(),
                      [](const KeptIsland& k) { return k.state != KeptIsland::State::kSolved; });

@@ -36,6 +36,7 @@ struct Exchange {
 
   std::vector<KeptIsland> kept;
   bool retry = false;      // something has come since islands were last tried
+  bool postponed = false;  // so it has, but not all neighbours have reached the step, and shared islands were left out
   bool part_due = true;    // this world's part may not be what was told
   bool finals_due = true;  // parts that were passed on may have become final
   bool part_stale = true;  // this world's part in `parts` may not be that of `kept`
@@ -55,6 +56,7 @@ struct Exchange {
   // Makes this world's part out of the islands kept, if they have changed.
   void refresh_part(WorldId me, std::uint32_t epoch, Step step);
   bool open() const;      // whether results are lacking
+  bool held() const;      // whether there are open islands that are not shared
   bool unsolved() const;  // whether results are lacking, or unconfirmed
 };
 

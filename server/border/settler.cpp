@@ -118,7 +118,14 @@ void Settler::finals_due(Step first, Step last) {
 }
 
 void Settler::retry_all() {
-  for (Exchange& exchange : exchanges_) exchange.retry = exchange.retry || exchange.unsolved();
+  for (Step step = base_; step < base_ + static_cast<Step>(exchanges_.size()); ++step) {
+    Exchange& exchange = at(step);
+    // Of what is shared nothing is told, or heard in full, before all have reached the step.
+    if (context_.all_have_reached(step))
+      exchange.retry = exchange.retry || std::exchange(exchange.postponed, false) || exchange.unsolved();
+    else
+      exchange.retry = exchange.retry || exchange.held();
+  }
 }
 
 // ---- settling
@@ -136,7 +143,9 @@ BodySet Settler::solve(BodySet island) {
 bool Settler::try_settle(Step step, const std::function<void(const BodySet&)>& settle) {
   Exchange& exchange = at(step);
   if (!std::exchange(exchange.retry, false)) return false;
-  exchange.refresh_part(context_.settings.me, context_.settings.epoch, step);
+  const bool all_there = context_.all_have_reached(step);
+  exchange.postponed = !all_there;
+  if (all_there) exchange.refresh_part(context_.settings.me, context_.settings.epoch, step);
   bool threats_known = false, any = false;
   BodySet alone;
   for (KeptIsland& island : exchange.kept) {
@@ -144,6 +153,7 @@ bool Settler::try_settle(Step step, const std::function<void(const BodySet&)>& s
       if (!std::exchange(threats_known, true)) find_threats(step);
       if (threats_.meet(island.boxes)) continue;
     }
+    if (island.shared && !all_there) continue;
     if (island.shared) {
       any = try_shared(step, island, settle) || any;
     } else if (island.state == State::kOpen) {
@@ -294,10 +304,11 @@ bool Settler::part_is_final(Step step, WorldId origin) const {
 
 bool Settler::all_final(Step step) const {
   const Exchange& exchange = at(step);
-  return !exchange.retry && std::all_of(exchange.kept.begin(), exchange.kept.end(), [&](const KeptIsland& island) {
-    return island.state == State::kSolved &&
-           std::all_of(island.worlds.begin(), island.worlds.end(), [&](WorldId w) { return part_is_final(step, w); });
-  });
+  return !exchange.retry && !exchange.postponed &&
+         std::all_of(exchange.kept.begin(), exchange.kept.end(), [&](const KeptIsland& island) {
+           return island.state == State::kSolved && std::all_of(island.worlds.begin(), island.worlds.end(),
+                                                                [&](WorldId w) { return part_is_final(step, w); });
+         });
 }
 
 std::string Settler::why_not_final(Step step) const {

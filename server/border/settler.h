@@ -22,8 +22,11 @@ class Settler {
   void extended(Step step);
   bool finding(Step step, bool all);
   void dropped(Step step, const timeline::Island& island);
-  bool must_wait(std::span<const Aabb> boxes) { return threats_.meet(boxes); }
+  bool must_wait(std::span<const Aabb> boxes) { return threats_.meet(boxes); }  // at the step of the last find_threats
   void keep(Step step, timeline::Found found);
+
+  // Where those may be at `step` for whom its islands must wait.
+  void find_threats(Step step);
 
   // ---- news
   void part_came(const Link& from, Part part);
@@ -57,7 +60,6 @@ class Settler {
  private:
   Exchange& at(Step step) { return exchanges_.at(static_cast<std::size_t>(step - base_)); }
   const Exchange& at(Step step) const { return exchanges_.at(static_cast<std::size_t>(step - base_)); }
-  void find_threats(Step step);
   bool try_shared(Step step, KeptIsland& island, const std::function<void(const BodySet&)>& settle);
   BodySet solve(BodySet island);
   bool part_is_final(Step step, WorldId origin) const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <utility>
@@ -48,6 +49,7 @@ class WorldCore::Impl final : timeline::Arbiter {
       link->receive(std::move(message), [&](Message& m) { deliver(*link, m); });
       stats_.duplicates += link->duplicates() - before;
       settler_.finals_due(near_final + 1, link->near_final());
+      deferred_.clear();
       settler_.retry_all();
       finalise();
       return true;
@@ -88,7 +90,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     const Step end = std::min({settings_.last_step, limit_, final_ + settings_.window});
     for (Step step = final_; step < end && step <= timeline_.newest(); ++step) {
       if (!may_process(step)) return false;
-      if (timeline_.has_pending(step) || step == timeline_.newest()) {
+      if ((timeline_.has_pending(step) || step == timeline_.newest()) && is_worth(step)) {
         if (step == timeline_.newest() && !context_.all_have_reached(step)) ++stats_.anticipated;
         timeline_.process(step);
         settler_.retry_all();  // who waited for islands that were found anew may not need to any more
@@ -97,6 +99,30 @@ class WorldCore::Impl final : timeline::Arbiter {
       if (settler_.retry_is_due(step) && settler_.try_settle(step, [&](const BodySet& set) { settle(step, set); }))
         return true;
     }
+    return false;
+  }
+
+  // Whether more would come of doing a step's pending bodies now than islands that must wait, to be found again when
+  // those have told their bodies for whom they wait.
+  bool is_worth(Step step) {
+    if (context_.all_have_reached(step)) return true;
+    const std::span<const timeline::Slot> pending = timeline_.pending(step);
+    const auto known = deferred_.find(step);
+    if (known != deferred_.end() && known->second == pending.size()) return false;
+    settler_.find_threats(step);
+    for (const timeline::Slot slot : pending) {
+      const timeline::Record* const record = timeline_.known(step, slot);
+      if (!record) continue;
+      if (timeline_.own(*record)) {
+        const Aabb box = physics::reach_box(record->body, model_);
+        if (!settler_.must_wait({&box, 1})) return true;
+      } else {
+        for (std::size_t source = 0; source < links_.size(); ++source)
+          if (links_[source].upto() >= step && timeline_.heard(source, step)->find(slot)) return true;
+      }
+    }
+    if (pending.empty()) return true;  // nothing moves: the step costs nothing
+    deferred_[step] = pending.size();
     return false;
   }
 
@@ -294,9 +320,10 @@ class WorldCore::Impl final : timeline::Arbiter {
   std::string refusal_;
   Step final_ = -1, near_final_ = -1, limit_ = std::numeric_limits<Step>::max();
   bool begun_ = false;
-  bool idle_ = false;                  // nothing can be done before something comes
-  bool untold_ = true;                 // something has changed since it was last looked at what to tell
-  mutable std::optional<Step> front_;  // as long as nothing changes
+  std::map<Step, std::size_t> deferred_;  // steps that were not worth doing, with so many pending bodies
+  bool idle_ = false;                     // nothing can be done before something comes
+  bool untold_ = true;                    // something has changed since it was last looked at what to tell
+  mutable std::optional<Step> front_;     // as long as nothing changes
   Neighbourhood neighbourhood_;
   std::vector<Link> links_;
   Context context_;

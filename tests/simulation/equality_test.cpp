@@ -71,10 +71,6 @@ INSTANTIATE_TEST_SUITE_P(Sample, Equality,
                          testing::Combine(testing::ValuesIn(scene_names()), testing::Values(2u, 5u),
                                           testing::Values(1, 2)),
                          param_name);
-INSTANTIATE_TEST_SUITE_P(All, Equality,
-                         testing::Combine(testing::ValuesIn(scene_names()), testing::Range(2u, 10u),
-                                          testing::Range(100, 112)),
-                         param_name);
 
 // Territories in any shape, not even connected: every body is near somebody else's.
 class AnyTerritories : public testing::TestWithParam<std::tuple<std::string, int>> {};
@@ -98,7 +94,6 @@ std::string any_name(const testing::TestParamInfo<std::tuple<std::string, int>>&
 
 const auto kAnyScenes = testing::Values("cubes", "city", "cluster", "wide_bodies", "fast_bodies", "corner");
 INSTANTIATE_TEST_SUITE_P(Sample, AnyTerritories, testing::Combine(kAnyScenes, testing::Range(2, 4)), any_name);
-INSTANTIATE_TEST_SUITE_P(All, AnyTerritories, testing::Combine(kAnyScenes, testing::Range(100, 130)), any_name);
 
 TEST(WideBodies, AreToldToEveryWorldTheyReach) {
   const Reference& expected = reference("wide_bodies");
