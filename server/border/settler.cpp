@@ -80,12 +80,15 @@ void Settler::find_threats(Step step) {
         threats_.add(physics::reach_box(b.record->body, context_.model), b.record->body.v(),
                      static_cast<double>(step - seen) * dt, margin);
   }
+  // A body that waits at one step waits at the following: where it was first seen says it all.
+  threatening_.clear();
   for (Step seen = base_; seen < step; ++seen)
     for (const KeptIsland& island : at(seen).kept) {
       if (island.state != State::kOpen) continue;
       for (std::size_t i = 0; i < island.boxes.size(); ++i)
-        threats_.add(island.boxes[i], island.component->set.bodies[i].v(), static_cast<double>(step - seen) * dt,
-                     margin);
+        if (threatening_.add(island.island->own[i]))
+          threats_.add(island.boxes[i], island.component->set.bodies[i].v(), static_cast<double>(step - seen) * dt,
+                       margin);
     }
 }
 
@@ -118,12 +121,15 @@ void Settler::finals_due(Step first, Step last) {
 }
 
 void Settler::retry_all() {
+  bool open = false;
   for (Step step = base_; step < base_ + static_cast<Step>(exchanges_.size()); ++step) {
     Exchange& exchange = at(step);
     // Of what is shared nothing is told, or heard in full, before all have reached the step.
+    const bool first_open = !open && exchange.open();
+    open = open || first_open;
     if (context_.all_have_reached(step))
       exchange.retry = exchange.retry || std::exchange(exchange.postponed, false) || exchange.unsolved();
-    else
+    else if (first_open)  // what waits later mostly waits for what waits here
       exchange.retry = exchange.retry || exchange.held();
   }
 }

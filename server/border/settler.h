@@ -70,6 +70,7 @@ class Settler {
   std::deque<Exchange> exchanges_;
   Step base_ = 0;
   Threats threats_;
+  timeline::Marks threatening_;
   std::vector<std::pair<bool, Part>> later_parts_;  // for steps without an entry yet; whether direct
   std::vector<FinalPart> later_finals_;
   std::vector<physics::Ends> ends_;

@@ -20,6 +20,7 @@
 
 #include "common/body_set.h"
 #include "server/physics/stepper.h"
+#include "server/timeline/marks.h"
 #include "server/timeline/record.h"
 #include "server/timeline/spatial_index.h"
 #include "server/timeline/table.h"
@@ -152,21 +153,6 @@ class Timeline {
     std::size_t count = 0;
     std::uint64_t hash = 0;
   };
-  // Marks by slot that are all taken away at once.
-  class Marks {
-   public:
-    void clear() { ++stamp_; }
-    bool add(Slot slot) {
-      if (slot >= stamps_.size()) stamps_.resize(slot + slot / 2 + 64, 0);
-      return std::exchange(stamps_[slot], stamp_) != stamp_;
-    }
-    bool has(Slot slot) const { return slot < stamps_.size() && stamps_[slot] == stamp_; }
-
-   private:
-    std::vector<std::uint64_t> stamps_;
-    std::uint64_t stamp_ = 1;
-  };
-
   Entry& at(Step step) { return entries_.at(static_cast<std::size_t>(step - base_)); }
   const Entry& at(Step step) const { return entries_.at(static_cast<std::size_t>(step - base_)); }
   void extend();
