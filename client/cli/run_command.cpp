@@ -33,6 +33,7 @@ struct RunOptions {
   std::string scene;
   std::string session;
   WorldId worlds = 4;
+  bool worlds_given = false;
   Step steps = kDefaultSteps;
   std::string pace = "realtime";
   std::string sync = "anticipative";
@@ -113,6 +114,8 @@ std::vector<WorldId> checked(RunOptions& o) {
   (void)parse_pace(o.pace);
   if (o.single()) {
     if (!o.start.empty()) throw std::invalid_argument("--start: there is only one world with --sync single");
+    if (o.worlds_given && o.worlds != 1)
+      throw std::invalid_argument("--worlds: there is only one world with --sync single");
     o.worlds = 1;
   }
   if (!o.follow.files.dump.empty()) {
@@ -223,8 +226,9 @@ void add_run_command(CLI::App& app, int& exit_code) {
   command->add_flag("--quiet,-q", o->follow.quiet, "no progress");
   command->add_flag("--verbose,-v", o->follow.verbose, "show all that the daemons say");
   dds::add_network_options(*command, o->network);
-  command->callback([o, &exit_code] {
+  command->callback([o, command, &exit_code] {
     try {
+      o->worlds_given = command->count("--worlds") > 0;
       exit_code = run(*o);
     } catch (const SceneError& e) {
       std::fprintf(stderr, "error: %s\n", e.what());

@@ -110,10 +110,12 @@ void Table::draw(const Collector& collector, Clock::time_point now) {
 
 void Table::print_line(const Collector& collector, Clock::time_point now) {
   const double speed = total_.at(now, collector.whole_steps());
-  std::fprintf(stderr, "%s\n",
-               fmt::format("{}, {} bodies in {} worlds, {:.0f} steps/s", progress(collector, now), collector.bodies(),
-                           collector.worlds().size(), speed)
-                   .c_str());
+  std::string line = fmt::format("{}, {} bodies in {} worlds, {:.0f} steps/s", progress(collector, now),
+                                 collector.bodies(), collector.worlds().size(), speed);
+  for (const wire::Status& s : collector.worlds())
+    if (const auto heard = collector.heard(s.world()); heard && now - *heard > dds::kSilence)
+      line += fmt::format(", world {} is silent", s.world());
+  std::fprintf(stderr, "%s\n", line.c_str());
 }
 
 void Table::say(const std::string& line) {
@@ -155,9 +157,10 @@ void print_summary(const Collector& collector, bool complete) {
     text += fmt::format(
         ", {:.1f} s waiting; {} synchronised steps, {} mixed islands, {} bodies changed worlds, {:.1f} MB sent",
         waiting, syncs, mixed, arrived, 1e-6 * static_cast<double>(bytes));
-  if (anticipated > 0)
-    text += fmt::format("\n{} steps anticipated; {} rollbacks, which did {} of {} results of bodies again", anticipated,
-                        rollbacks, redone, computed);
+  if (anticipated > 0) text += fmt::format("\n{} steps anticipated", anticipated);
+  if (anticipated > 0 && rollbacks > 0)
+    text += fmt::format("; {} {} did {} of {} results of bodies again", rollbacks,
+                        rollbacks == 1 ? "rollback" : "rollbacks", redone, computed);
   if (interruptions > 0) text += fmt::format("\n{} interrupted connections were taken up again", interruptions);
   if (clamped > 0) text += fmt::format("\nwarning: bodies were slowed to the scene's largest speed {} times", clamped);
   if (held > 0) text += fmt::format("\nwarning: {} results were not finite and held back", held);

@@ -30,6 +30,12 @@ void Exchange::refresh_part(WorldId me, std::uint32_t epoch, Step step) {
   parts.put(std::move(part));
 }
 
+void Exchange::note_final(const FinalPart& part) {
+  Revision& newest = finals[part.origin];
+  newest = std::max(newest, part.revision);
+  finals_due = true;
+}
+
 bool Exchange::open() const {
   return std::any_of(kept.begin(), kept.end(), [](const KeptIsland& k) { return k.state == KeptIsland::State::kOpen; });
 }

@@ -55,6 +55,8 @@ struct Exchange {
 
   // Makes this world's part out of the islands kept, if they have changed.
   void refresh_part(WorldId me, std::uint32_t epoch, Step step);
+  // Of an origin's revisions the newest counts.
+  void note_final(const FinalPart& part);
   bool open() const;      // whether results are lacking
   bool held() const;      // whether there are open islands that are not shared
   bool unsolved() const;  // whether results are lacking, or unconfirmed

@@ -5,6 +5,12 @@
 #include <utility>
 
 namespace soda::border {
+namespace {
+
+// Messages that a peer may be ahead of what has arrived: far more than windows allow.
+constexpr std::uint64_t kFarthest = 1u << 14;
+
+}  // namespace
 
 Link::Link(std::uint64_t session, WorldId me, std::uint32_t epoch, WorldId peer)
     : session_(session), me_(me), peer_(peer), epoch_(epoch) {}
@@ -56,7 +62,8 @@ void Link::receive(Message message, const std::function<void(Message&)>& deliver
   const Header& h = message.header;
   if ((peer_epoch_ && *peer_epoch_ != h.epoch) || (h.sequence > 0 && h.to_epoch != 0 && h.to_epoch != epoch_))
     throw CodecError("border message of another start of world " + std::to_string(h.from) + " or of this one");
-  peer_epoch_ = h.epoch;
+  if (h.sequence > received_ + kFarthest)
+    throw CodecError("border message " + std::to_string(h.sequence) + " is too far ahead");
   const std::uint64_t logged_before = sent_ - log_.size();
   if (h.ack > logged_before && h.ack <= sent_)
     log_.erase(log_.begin(), log_.begin() + static_cast<std::ptrdiff_t>(h.ack - logged_before));
@@ -72,6 +79,7 @@ void Link::receive(Message message, const std::function<void(Message&)>& deliver
     early_.erase(early_.begin());
     deliver(next);  // a message that is refused does not count, and will be asked for again
     ++received_;
+    peer_epoch_ = next.header.epoch;
     upto_ = next.header.upto;
     final_ = std::max(final_, next.header.final_step);
     near_final_ = std::max(near_final_, next.header.near_final);

@@ -33,7 +33,7 @@ void Settler::extended(Step step) {
     at(step).parts.put(std::move(part));
   }
   std::erase_if(later_finals_, [&](const FinalPart& part) {
-    if (part.step == step) at(step).finals[part.origin] = part.revision;
+    if (part.step == step) at(step).note_final(part);
     return part.step <= step;
   });
 }
@@ -80,6 +80,16 @@ void Settler::find_threats(Step step) {
         threats_.add(physics::reach_box(b.record->body, context_.model), b.record->body.v(),
                      static_cast<double>(step - seen) * dt, margin);
   }
+  // Bodies that were handed over there are not among those that are heard of.
+  for (std::size_t l = 0; l < context_.links.size(); ++l) {
+    const Step seen = std::max(context_.links[l].upto(), timeline.oldest());
+    if (seen >= step) continue;
+    timeline.for_each_departed(seen, [&](const timeline::Record& record) {
+      if (record.place.owner == context_.links[l].peer() && !record.body.asleep())
+        threats_.add(physics::reach_box(record.body, context_.model), record.body.v(),
+                     static_cast<double>(step - seen) * dt, margin);
+    });
+  }
   // A body that waits at one step waits at the following: where it was first seen says it all.
   threatening_.clear();
   for (Step seen = base_; seen < step; ++seen)
@@ -112,7 +122,7 @@ void Settler::final_part_came(const FinalPart& part) {
   if (part.step >= base_ + static_cast<Step>(exchanges_.size()))
     later_finals_.push_back(part);
   else
-    at(part.step).finals[part.origin] = part.revision, at(part.step).finals_due = true;
+    at(part.step).note_final(part);
 }
 
 void Settler::finals_due(Step first, Step last) {

@@ -49,6 +49,7 @@ class Settler {
   // that were passed on.
   void tell(Step step);
   bool told(Step step) const { return !at(step).part_due; }
+  bool all_told(Step step) const { return !at(step).part_due && !at(step).finals_due; }
 
   // Whether all islands of the step are solved, with parts that cannot change any more.
   bool all_final(Step step) const;

@@ -43,21 +43,35 @@ class WorldCore::Impl final : timeline::Arbiter {
       Link* link = context_.link_to(h.from);
       if (!link) throw CodecError("border message from world " + std::to_string(h.from) + ", which is no neighbour");
       check(message, settings_.me, map_.worlds);
-      const std::uint64_t before = link->duplicates();
-      const Step near_final = link->near_final();
-      changed();
-      link->receive(std::move(message), [&](Message& m) { deliver(*link, m); });
-      stats_.duplicates += link->duplicates() - before;
-      settler_.finals_due(near_final + 1, link->near_final());
-      deferred_.clear();
-      settler_.retry_all();
-      finalise();
-      return true;
+      return take(*link, std::move(message));
     } catch (const CodecError& error) {
-      ++stats_.refused;
-      refusal_ = error.what();
-      return false;
+      return refuse(error);
     }
+  }
+
+  bool refuse(const CodecError& error) {
+    ++stats_.refused;
+    refusal_ = error.what();
+    return false;
+  }
+
+  // Whatever of the stream could be delivered counts, also where a later message is refused.
+  bool take(Link& link, Message message) {
+    const std::uint64_t before = link.duplicates();
+    const Step near_final = link.near_final();
+    bool good = true;
+    try {
+      link.receive(std::move(message), [&](Message& m) { deliver(link, m); });
+    } catch (const CodecError& error) {
+      good = refuse(error);
+    }
+    changed();
+    stats_.duplicates += link.duplicates() - before;
+    settler_.finals_due(near_final + 1, link.near_final());
+    deferred_.clear();
+    settler_.retry_all();
+    finalise();
+    return good;
   }
 
   void reconnect(WorldId neighbour) {
@@ -74,9 +88,12 @@ class WorldCore::Impl final : timeline::Arbiter {
     if (!std::exchange(begun_, true)) observer_.finalised(0, Produced(timeline_, 0));
     const bool worked = idle_ ? false : advance();
     if (worked) changed();
+    const Step final_before = final_;
     if (!idle_) finalise();
-    idle_ = !worked;
-    if (worked) return Progress::kWorked;
+    const bool more_final = final_ != final_before;  // which is to be told, and gives room for more
+    if (more_final) changed();
+    idle_ = !worked && !more_final;
+    if (worked || more_final) return Progress::kWorked;
     if (final_ == settings_.last_step && context_.near_final(final_)) return Progress::kDone;
     return timeline_.newest() >= limit_ && limit_ < settings_.last_step ? Progress::kAtLimit : Progress::kWaiting;
   }
@@ -96,7 +113,8 @@ class WorldCore::Impl final : timeline::Arbiter {
         settler_.retry_all();  // who waited for islands that were found anew may not need to any more
         return true;
       }
-      if (settler_.retry_is_due(step) && settler_.try_settle(step, [&](const BodySet& set) { settle(step, set); }))
+      if (step < timeline_.newest() && !timeline_.has_pending(step) && settler_.retry_is_due(step) &&
+          settler_.try_settle(step, [&](const BodySet& set) { settle(step, set); }))
         return true;
     }
     return false;
@@ -260,7 +278,11 @@ class WorldCore::Impl final : timeline::Arbiter {
       if (step < 0 || step > horizon)
         throw CodecError(std::string(what) + ": step " + std::to_string(step) + " cannot be");
     };
-    bounded(message.header.upto, "stream");
+    const Header& h = message.header;
+    bounded(h.upto, "stream");
+    if (h.near_final < -1 || h.near_final > h.final_step || h.final_step > h.upto || h.final_step > final_ + 1)
+      throw CodecError("stream: final steps " + std::to_string(h.final_step) + " and " + std::to_string(h.near_final) +
+                       " cannot be");
     for (const Frame& frame : message.frames) {
       bounded(frame.step, "frame");
       if (frame.step <= link.final_step())
@@ -269,15 +291,31 @@ class WorldCore::Impl final : timeline::Arbiter {
     for (const Part& part : message.parts) bounded(part.step, "part");
     for (const FinalPart& part : message.finals) bounded(part.step, "final part");
 
-    const std::size_t source = context_.index_of(link);
+    std::vector<timeline::Ref<timeline::NearSet>> sets;
     for (const Frame& frame : message.frames) {
-      timeline_.hear(source, frame.step, timeline_.near_set(frame.set));
+      sets.push_back(timeline_.near_set(frame.set));
+      for (const timeline::NearSet::Body& b : sets.back()->bodies) check_body(*b.record);
+    }
+    const std::size_t source = context_.index_of(link);
+    for (std::size_t i = 0; i < sets.size(); ++i) {
+      const Frame& frame = message.frames[i];
+      timeline_.hear(source, frame.step, std::move(sets[i]));
       // What was told of one step says something of those after it.
       for (Step step = std::max(frame.step, timeline_.oldest()); step <= timeline_.newest(); ++step)
         settler_.part_due(step);
     }
     for (Part& part : message.parts) settler_.part_came(link, std::move(part));
     for (const FinalPart& part : message.finals) settler_.final_part_came(part);
+  }
+
+  // What a neighbour may tell of: bodies of this world or of a neighbour, no faster than the scene lets them be.
+  void check_body(const timeline::Record& record) const {
+    const std::string name = "frame: body " + std::to_string(record.body.id);
+    if (record.place.owner != settings_.me && !context_.link_to(record.place.owner))
+      throw CodecError(name + " is of world " + std::to_string(record.place.owner) + ", which is no neighbour");
+    constexpr double kRounding = 1 + 1e-9;
+    if (!(record.body.v().norm() <= model_.scene().max_speed * kRounding))
+      throw CodecError(name + " is faster than the scene's largest speed");
   }
 
   // ---- finality
@@ -298,7 +336,9 @@ class WorldCore::Impl final : timeline::Arbiter {
   // What is final, and told to be so, is not needed any more; the newest final state is where the next step starts
   // from.
   void release() {
-    const Step keep = links_.empty() ? final_ : std::min(final_, near_final_ + 1);
+    Step keep = links_.empty() ? final_ : std::min(final_, near_final_ + 1);
+    for (Step step = timeline_.oldest(); step < keep; ++step)
+      if (!settler_.all_told(step)) keep = step;
     for (Step step = timeline_.oldest(); step < keep; ++step) count(step);
     timeline_.release_before(keep);
     announcer_.release_before(keep);

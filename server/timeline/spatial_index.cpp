@@ -14,10 +14,13 @@ SpatialIndex::Key SpatialIndex::key_of(std::int64_t x, std::int64_t y, std::int6
   return h >= kEverywhere ? 0 : h;
 }
 
+std::int64_t SpatialIndex::cell_along(double place) const {
+  constexpr double kFar = 1e12;  // cells; beyond, all is one
+  return static_cast<std::int64_t>(std::clamp(std::floor(place * inverse_), -kFar, kFar));
+}
+
 SpatialIndex::Key SpatialIndex::key_of(const Vec3& centre) const {
-  return key_of(static_cast<std::int64_t>(std::floor(centre.x() * inverse_)),
-                static_cast<std::int64_t>(std::floor(centre.y() * inverse_)),
-                static_cast<std::int64_t>(std::floor(centre.z() * inverse_)));
+  return key_of(cell_along(centre.x()), cell_along(centre.y()), cell_along(centre.z()));
 }
 
 void SpatialIndex::note(Slot slot, const Vec3& centre, bool large, Step step) {
@@ -45,8 +48,8 @@ void SpatialIndex::query(const Aabb& box, std::vector<Slot>& out) const {
   std::int64_t low[3], high[3];
   double cells = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    low[axis] = static_cast<std::int64_t>(std::floor((box.min[axis] - half_) * inverse_));
-    high[axis] = static_cast<std::int64_t>(std::floor((box.max[axis] + half_) * inverse_));
+    low[axis] = cell_along(box.min[axis] - half_);
+    high[axis] = cell_along(box.max[axis] + half_);
     cells *= static_cast<double>(high[axis] - low[axis] + 1);
   }
   if (cells > static_cast<double>(cells_.size())) {  // a very large body

@@ -41,6 +41,7 @@ class SpatialIndex {
   static constexpr Key kNowhere = ~Key{0}, kEverywhere = kNowhere - 1;
   static Key key_of(std::int64_t x, std::int64_t y, std::int64_t z);
   Key key_of(const Vec3& centre) const;
+  std::int64_t cell_along(double place) const;
   void leave(Slot slot, Key key);
 
   double inverse_, half_;

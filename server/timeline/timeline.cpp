@@ -108,9 +108,11 @@ void Timeline::release_before(Step step) {
 // ---- what others tell ----------------------------------------------------------------------------------------------
 
 void Timeline::hear(std::size_t source, Step step, Ref<NearSet> set) {
-  for (const NearSet::Body& b : set->bodies) note(b.slot, b.record->body, std::max(step, newest()));
-  told_[source][step] = std::move(set);
-  if (step >= base_ && step <= newest()) assume(source, step);
+  Ref<NearSet>& told = told_[source][step];
+  told = std::move(set);
+  if (step < base_ || step > newest()) return;
+  assume(source, step);
+  for (const NearSet::Body& b : told->bodies) note_repaired(b.slot, b.record->body, step);
 }
 
 // What the source says of `step`, or what follows from the step before, and so on as long as that changes anything.
@@ -140,7 +142,11 @@ void Timeline::extend() {
   next.changed.clear();
   entries_.push_back(std::move(next));
   ++stats_.steps;
-  for (std::size_t source = 0; source < told_.size(); ++source) assume(source, newest());
+  for (std::size_t source = 0; source < told_.size(); ++source) {
+    assume(source, newest());
+    if (const auto told = told_[source].find(newest()); told != told_[source].end())
+      for (const NearSet::Body& b : told->second->bodies) note(b.slot, b.record->body, newest());
+  }
   arbiter_.extended(newest());
 }
 
@@ -150,6 +156,13 @@ void Timeline::note(Slot slot, const BodyState& body, Step step) {
   const double reach =
       m.radius * (1 + std::min(1.0, body.w().norm() * dt)) + body.v().norm() * dt + physics::kContactMargin;
   index_.note(slot, body.x(), reach > index_.ordinary_reach(), step);
+}
+
+// The index must end with where the body is at the newest step, for entries to come copy that.
+void Timeline::note_repaired(Slot slot, const BodyState& body, Step step) {
+  note(slot, body, newest());
+  if (step == newest()) return;
+  if (const Record* const now = known(newest(), slot)) note(slot, now->body, newest());
 }
 
 // ---- the round: what must be done
@@ -251,16 +264,17 @@ void Timeline::find(Step step) {
   stepper_.find_islands(bodies_, contacts_, ends_, islands_);
 }
 
-// Whether an island was looked for in this round: it has bodies to do, or is a contact of others' wide bodies that
-// changed. Others may be incomplete.
+// Whether an island was looked for in this round: it has bodies to do, or bodies that changed, or consists of others'
+// wide bodies. What else is found, because it is around, may be incomplete.
 bool Timeline::concerned(std::uint32_t island) const {
   const auto members = islands_.bodies_of(island);
-  bool any_own = false;
+  bool any_own = false, changed = false;
   for (const std::uint32_t i : members) {
     if (in_affected_.has(around_[i])) return true;
     any_own = any_own || own(*records_[i]);
+    changed = changed || in_changed_.has(around_[i]);
   }
-  return !any_own && members.size() > 1;
+  return members.size() > 1 && (changed || !any_own);
 }
 
 // Islands found reach further than what was to be done: whether any do, and so all must be found again.
@@ -282,6 +296,8 @@ bool Timeline::grown(Step step) {
 void Timeline::process(Step step) {
   changed_ = std::exchange(at(step).pending, {});
   sort_unique(changed_);
+  in_changed_.clear();
+  for (const Slot slot : changed_) in_changed_.add(slot);
   in_affected_.clear();
   in_around_.clear();
   in_old_islands_.clear();
@@ -401,7 +417,7 @@ void Timeline::finish() {
     if (!has_result_[i]) continue;
     const Record* const old = at(step + 1).produced.get(around_[i]);
     if (old && same(*old, bodies_[i], contacts))
-      note(around_[i], bodies_[i], newest());  // healed, or at rest
+      note_repaired(around_[i], bodies_[i], step + 1);  // healed, or at rest
     else
       results_.emplace_back(around_[i], make_record(bodies_[i], contacts, arbiter_.place(bodies_[i]), step + 1));
     ++stats_.bodies_computed;
@@ -420,7 +436,7 @@ void Timeline::settle(Step step, const BodySet& results) {
     const Slot slot = slot_of(body.id);
     const Record* const old = at(step + 1).produced.get(slot);
     if (old && same(*old, body, contacts))
-      note(slot, body, newest());
+      note_repaired(slot, body, step + 1);
     else
       results_.emplace_back(slot, make_record(body, contacts, arbiter_.place(body), step + 1));
     ++stats_.bodies_computed;
@@ -444,9 +460,11 @@ void Timeline::store(Step step, std::vector<Table<Record>::Item>& items) {
     set_departed(entry, slot, !own(*record));
     entry.pending.push_back(slot);
     entry.changed.push_back(slot);
-    note(slot, record->body, newest());
+    stored_.emplace_back(slot, record.get());
   }
   entry.produced.assign(items);
+  for (const auto& [slot, record] : stored_) note_repaired(slot, record->body, step);
+  stored_.clear();
   items.clear();
   if (redone == 0) return;
   stats_.bodies_redone += redone;

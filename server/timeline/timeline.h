@@ -122,6 +122,11 @@ class Timeline {
   std::size_t count(Step step) const { return at(step).count; }
   std::uint64_t hash(Step step) const { return at(step).hash; }
   BodySet all_produced(Step step) const;
+  // f(record) for every body that this world produced at `step` and that is another's there.
+  template <typename F>
+  void for_each_departed(Step step, F&& f) const {
+    for (const Slot slot : at(step).departed) f(*at(step).produced.get(slot));
+  }
   // f(slot, record) for every wide body that is known at `step` and is not own, in no order; some twice.
   template <typename F>
   void for_each_foreign_wide(Step step, F&& f) const {
@@ -158,6 +163,7 @@ class Timeline {
   void extend();
   void assume(std::size_t source, Step step);
   void note(Slot slot, const BodyState& body, Step step);
+  void note_repaired(Slot slot, const BodyState& body, Step step);
   void affect(Step step, Slot slot);
   void affect_island(Step step, Slot slot);
   void affect_touched(Step step, const Record& foreign);
@@ -189,7 +195,7 @@ class Timeline {
   std::vector<Slot> affected_;  // own bodies to do
   std::vector<Slot> around_;    // those, and all that may touch them, ascending
   std::vector<Slot> candidates_;
-  Marks in_affected_, in_around_, in_old_islands_;
+  Marks in_changed_, in_affected_, in_around_, in_old_islands_;
   std::vector<Ref<Island>> old_islands_;
   std::vector<BodyState> bodies_;
   std::vector<const Record*> records_;
@@ -204,6 +210,7 @@ class Timeline {
   std::vector<std::uint8_t> has_result_;  // by position in bodies_
   std::vector<Aabb> boxes_;
   std::vector<Table<Record>::Item> results_;
+  std::vector<std::pair<Slot, const Record*>> stored_;
   std::vector<Table<Island>::Item> island_items_;
 };
 

@@ -143,7 +143,29 @@ TEST_F(Messages, OfOthersChangeNothing) {
   bad = hello;
   bad.parts = {{.origin = 9, .step = 0, .revision = {}, .components = {}}};
   EXPECT_NE(refusal(bad).find("origin 9"), std::string::npos);
-  EXPECT_EQ(world.stats().refused, 5u);
+  bad = hello;
+  bad.header.sequence = 1;
+  bad.header.upto = 3;
+  bad.header.final_step = 2;
+  EXPECT_NE(refusal(bad).find("final steps 2"), std::string::npos) << "nobody is that far without this world";
+  bad = hello;
+  bad.header.sequence = 1;
+  bad.frames = {{0, {1, 1}, message_.frames[0].set}};
+  bad.frames[0].set.contacts.clear();
+  bad.frames[0].set.bodies[4].linear_velocity[0] = -1e25;
+  EXPECT_NE(refusal(bad).find("faster than"), std::string::npos);
+  bad = hello;
+  bad.header.sequence = 1u << 20;
+  EXPECT_NE(refusal(bad).find("too far ahead"), std::string::npos);
+  EXPECT_EQ(world.stats().refused, 8u);
+  // None of them has spoilt the stream, or the sender's epoch.
+  hello.header.sequence = 1;
+  hello.header.epoch = 9;
+  hello.header.final_step = 0;
+  EXPECT_TRUE(world.receive(border::encode(hello))) << world.last_refusal();
+  hello.header.sequence = 2;
+  hello.header.epoch = 10;
+  EXPECT_NE(refusal(hello).find("another start"), std::string::npos);
   EXPECT_EQ(world.clock(), 0);
 }
 

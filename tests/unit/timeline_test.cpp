@@ -165,6 +165,40 @@ TEST(Timeline, WhatRestsIsSharedByAllEntries) {
   EXPECT_EQ(shared, 40u);
 }
 
+// What rests is copied from entry to entry and never noted again: a repair of how it got there must not make the index
+// forget where it is.
+TEST(Timeline, WhatRestsIsFoundAfterARepairOfItsFall) {
+  SceneBuilder builder("strike");
+  builder.add_ground(100);
+  builder.add(Box{Vec3(0.5, 0.5, 0.5)}, Vec3(0, 0, 3.5));  // falls through some cells of the index
+  for (int i = 0; i < 80; ++i)
+    builder.add(Box{Vec3(0.5, 0.5, 0.5)}, Vec3(1.2 * (i % 40) - 24, 10 + 2 * (i / 40), 0.25));
+  Body& striker = builder.add(Sphere{0.25}, Vec3(-30, 0, 0.25));
+  striker.linear_velocity = Vec3(9, 0, 0);
+  striker.friction = 0;
+  const physics::Model model(builder.finish());
+  HalfSpace all(1e9);
+  Timeline timeline(model, 0, 0, all);
+  physics::Stepper stepper(model);
+  BodySet set = model.initial_state();
+  bool slept = false, struck = false;
+  for (Step step = 0; step < 260; ++step) {
+    ASSERT_EQ(physics::test::first_difference(set, timeline.all_produced(step)), "") << "step " << step;
+    slept = slept || set.bodies[0].asleep();
+    struck = struck || (slept && !set.bodies[0].asleep());
+    stepper.step(set);
+    advance(timeline, step + 1);
+    if (step == 110) {
+      ASSERT_TRUE(slept);
+      const Slot faller = timeline.slot_of(set.bodies[0].id);
+      timeline.touch(3, std::span(&faller, 1));
+      advance(timeline, timeline.newest());
+    }
+    if (step > 110) timeline.release_before(step - 5);
+  }
+  EXPECT_TRUE(struck);
+}
+
 // Two groups far apart; a late message puts a foreign body into one of them.
 TEST(Timeline, AChangeDoesAgainWhatItTouchesAndNothingElse) {
   SceneBuilder builder("two groups");
