@@ -90,9 +90,11 @@ TEST_F(Failure, CtrlCEndsEverythingAndKeepsWhatThereIs) {
 
 TEST_F(Failure, DaemonsEndWhenTheCommandIsKilled) {
   for (const char* const sync : {"single", "conservative", "anticipative"}) {
-    Program session(soda({"run", scene("cubes", 300), "--worlds", "2", "--sync", sync, "--steps", "100000", "-q"}),
-                    directory());
-    const auto daemons = daemons_of(session, sync == std::string("single") ? 1 : 2);
+    const bool single = sync == std::string("single");
+    Program session(
+        soda({"run", scene("cubes", 300), "--worlds", single ? "1" : "2", "--sync", sync, "--steps", "100000", "-q"}),
+        directory());
+    const auto daemons = daemons_of(session, single ? 1 : 2);
     std::this_thread::sleep_for(500ms);
     session.signal(SIGKILL);
     expect_exit(session, -SIGKILL, 5s);
