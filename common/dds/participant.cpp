@@ -361,7 +361,6 @@ Participant::Participant(const NetworkOptions& options, const std::string& sessi
 Participant::~Participant() = default;
 
 // ---- writers
-// ----------------------------------------------------------------------------------------------------------
 
 struct WriterBase::Impl : fdds::DataWriterListener {
   fdds::Publisher* publisher = nullptr;
@@ -407,7 +406,6 @@ bool WriterBase::write_raw(const void* sample) {
 }
 
 // ---- readers
-// ----------------------------------------------------------------------------------------------------------
 
 struct ReaderBase::Impl : fdds::DataReaderListener {
   fdds::Subscriber* subscriber = nullptr;

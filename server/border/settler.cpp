@@ -10,7 +10,6 @@ namespace soda::border {
 using State = KeptIsland::State;
 
 // ---- what the timeline finds
-// -----------------------------------------------------------------------------------------
 
 void Settler::extended(Step step) {
   Exchange next(context_.neighbourhood, context_.links.size());
@@ -75,19 +74,15 @@ void Settler::find_threats(Step step) {
   for (std::size_t l = 0; l < context_.links.size(); ++l) {
     const Step seen = std::max(context_.links[l].upto(), timeline.oldest());
     if (seen >= step) continue;
-    for (const timeline::NearSet::Body& b : timeline.heard(l, seen)->bodies)
-      if (!b.record->body.asleep())
-        threats_.add(physics::reach_box(b.record->body, context_.model), b.record->body.v(),
-                     static_cast<double>(step - seen) * dt, margin);
-  }
-  // Bodies that were handed over there are not among those that are heard of.
-  for (std::size_t l = 0; l < context_.links.size(); ++l) {
-    const Step seen = std::max(context_.links[l].upto(), timeline.oldest());
-    if (seen >= step) continue;
-    timeline.for_each_departed(seen, [&](const timeline::Record& record) {
-      if (record.place.owner == context_.links[l].peer() && !record.body.asleep())
+    const auto add = [&](const timeline::Record& record) {
+      if (!record.body.asleep())
         threats_.add(physics::reach_box(record.body, context_.model), record.body.v(),
                      static_cast<double>(step - seen) * dt, margin);
+    };
+    for (const timeline::NearSet::Body& b : timeline.heard(l, seen)->bodies) add(*b.record);
+    // What was handed over there is not among what is heard of.
+    timeline.for_each_departed(seen, [&](const timeline::Record& record) {
+      if (record.place.owner == context_.links[l].peer()) add(record);
     });
   }
   // A body that waits at one step waits at the following: where it was first seen says it all.
@@ -103,7 +98,6 @@ void Settler::find_threats(Step step) {
 }
 
 // ---- what others tell
-// ------------------------------------------------------------------------------------------------
 
 void Settler::part_came(const Link& from, Part part) {
   const bool direct = part.origin == from.peer();
@@ -145,7 +139,6 @@ void Settler::retry_all() {
 }
 
 // ---- settling
-// --------------------------------------------------------------------------------------------------------
 
 BodySet Settler::solve(BodySet island) {
   physics::Stepper& stepper = context_.timeline.stepper();
@@ -234,7 +227,6 @@ bool Settler::try_shared(Step step, KeptIsland& island, const std::function<void
 }
 
 // ---- what is told
-// ----------------------------------------------------------------------------------------------------
 
 // What is used here of other worlds goes on to those that share the island, so that all parts reach all its worlds.
 void Settler::pass_on(Step step, const MixedIslands::Closure& closure) {

@@ -43,7 +43,6 @@ class Settler {
   // Islands of `step` that have become whole, or need not wait any longer, are solved and handed to `settle`.
   bool try_settle(Step step, const std::function<void(const BodySet&)>& settle);
   bool has_open(Step step) const { return at(step).open(); }
-  bool retry_is_due(Step step) const { return at(step).retry; }
 
   // Adds to the links' next messages the parts of `step`, all of which is found, and what has become final of those
   // that were passed on.

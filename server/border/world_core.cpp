@@ -32,7 +32,6 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // ---- what comes in
-  // -------------------------------------------------------------------------------------------------
   bool receive(std::span<const std::byte> bytes) {
     try {
       Message message = decode(bytes, model_);
@@ -83,7 +82,6 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // ---- work
-  // ----------------------------------------------------------------------------------------------------------
   Progress work() {
     if (!std::exchange(begun_, true)) observer_.finalised(0, Produced(timeline_, 0));
     const bool worked = idle_ ? false : advance();
@@ -113,7 +111,7 @@ class WorldCore::Impl final : timeline::Arbiter {
         settler_.retry_all();  // who waited for islands that were found anew may not need to any more
         return true;
       }
-      if (step < timeline_.newest() && !timeline_.has_pending(step) && settler_.retry_is_due(step) &&
+      if (step < timeline_.newest() && !timeline_.has_pending(step) &&
           settler_.try_settle(step, [&](const BodySet& set) { settle(step, set); }))
         return true;
     }
@@ -162,7 +160,6 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // ---- what goes out
-  // -------------------------------------------------------------------------------------------------
   std::vector<Outgoing> take_outgoing() {
     const bool waiting = idle_;
     if (!links_.empty() && std::exchange(untold_, false)) {
@@ -200,7 +197,6 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // ---- what is known
-  // -------------------------------------------------------------------------------------------------
   Step front() const {
     if (!front_) {
       Step step = final_;
@@ -310,12 +306,12 @@ class WorldCore::Impl final : timeline::Arbiter {
 
   // What a neighbour may tell of: bodies of this world or of a neighbour, no faster than the scene lets them be.
   void check_body(const timeline::Record& record) const {
-    const std::string name = "frame: body " + std::to_string(record.body.id);
+    const auto name = [&] { return "frame: body " + std::to_string(record.body.id); };  // for a refusal only
     if (record.place.owner != settings_.me && !context_.link_to(record.place.owner))
-      throw CodecError(name + " is of world " + std::to_string(record.place.owner) + ", which is no neighbour");
+      throw CodecError(name() + " is of world " + std::to_string(record.place.owner) + ", which is no neighbour");
     constexpr double kRounding = 1 + 1e-9;
     if (!(record.body.v().norm() <= model_.scene().max_speed * kRounding))
-      throw CodecError(name + " is faster than the scene's largest speed");
+      throw CodecError(name() + " is faster than the scene's largest speed");
   }
 
   // ---- finality

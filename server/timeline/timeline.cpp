@@ -21,6 +21,15 @@ void sort_unique(std::vector<Slot>& slots) {
   slots.erase(std::unique(slots.begin(), slots.end()), slots.end());
 }
 
+// Those of body `id`, which `rest` begins with; `rest` goes on behind them.
+std::span<const ContactRecord> take_contacts(std::span<const ContactRecord>& rest, BodyId id) {
+  std::size_t n = 0;
+  while (n < rest.size() && rest[n].a == id) ++n;
+  const auto taken = rest.first(n);
+  rest = rest.subspan(n);
+  return taken;
+}
+
 }  // namespace
 
 const Record* NearSet::find(Slot slot) const {
@@ -63,12 +72,9 @@ Ref<NearSet> Timeline::near_set(const BodySet& set) const {
   Ref<NearSet> near(new NearSet);
   near->bodies.reserve(set.bodies.size());
   std::span<const ContactRecord> rest(set.contacts);
-  for (const BodyState& body : set.bodies) {
-    std::size_t n = 0;
-    while (n < rest.size() && rest[n].a == body.id) ++n;
-    near->bodies.push_back({slot_of(body.id), make_record(body, rest.first(n), arbiter_.place(body), -1)});
-    rest = rest.subspan(n);
-  }
+  for (const BodyState& body : set.bodies)
+    near->bodies.push_back(
+        {slot_of(body.id), make_record(body, take_contacts(rest, body.id), arbiter_.place(body), -1)});
   return near;
 }
 
@@ -166,7 +172,6 @@ void Timeline::note_repaired(Slot slot, const BodyState& body, Step step) {
 }
 
 // ---- the round: what must be done
-// ------------------------------------------------------------------------------------
 
 void Timeline::touch(Step step, std::span<const Slot> slots) {
   at(step).pending.insert(at(step).pending.end(), slots.begin(), slots.end());
@@ -339,7 +344,6 @@ void Timeline::process(Step step) {
 }
 
 // ---- the round: islands and results
-// ------------------------------------------------------------------------------------
 
 void Timeline::sort_out(Step step, bool all) {
   Entry& entry = at(step);
@@ -390,7 +394,6 @@ void Timeline::keep(Step step, std::uint32_t island, Ref<Island> members) {
   Found found;
   found.island = std::move(members);
   for (const std::uint32_t i : islands_.bodies_of(island)) {
-    found.awake = found.awake || !bodies_[i].asleep();
     if (own(*records_[i])) {
       found.own.bodies.push_back(bodies_[i]);
       found.boxes.push_back(stepper_.boxes()[i]);
@@ -408,19 +411,11 @@ void Timeline::finish() {
   const Step step = std::exchange(unfinished_, -1);
   stepper_.solve(bodies_, contacts_, ends_, islands_, solved_);
   results_.clear();
-  const std::span<const ContactRecord> own_contacts(contacts_.data(), own_contacts_);
-  for (std::size_t i = 0, first = 0; i < bodies_.size(); ++i) {
-    std::size_t end = first;
-    while (end < own_contacts.size() && own_contacts[end].a == bodies_[i].id) ++end;
-    const auto contacts = own_contacts.subspan(first, end - first);
-    first = end;
+  std::span<const ContactRecord> rest(contacts_.data(), own_contacts_);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const auto contacts = take_contacts(rest, bodies_[i].id);
     if (!has_result_[i]) continue;
-    const Record* const old = at(step + 1).produced.get(around_[i]);
-    if (old && same(*old, bodies_[i], contacts))
-      note_repaired(around_[i], bodies_[i], step + 1);  // healed, or at rest
-    else
-      results_.emplace_back(around_[i], make_record(bodies_[i], contacts, arbiter_.place(bodies_[i]), step + 1));
-    ++stats_.bodies_computed;
+    take_result(step + 1, around_[i], bodies_[i], contacts);
   }
   store(step + 1, results_);
 }
@@ -428,20 +423,19 @@ void Timeline::finish() {
 void Timeline::settle(Step step, const BodySet& results) {
   results_.clear();
   std::span<const ContactRecord> rest(results.contacts);
-  for (const BodyState& body : results.bodies) {
-    std::size_t n = 0;
-    while (n < rest.size() && rest[n].a == body.id) ++n;
-    const auto contacts = rest.first(n);
-    rest = rest.subspan(n);
-    const Slot slot = slot_of(body.id);
-    const Record* const old = at(step + 1).produced.get(slot);
-    if (old && same(*old, body, contacts))
-      note_repaired(slot, body, step + 1);
-    else
-      results_.emplace_back(slot, make_record(body, contacts, arbiter_.place(body), step + 1));
-    ++stats_.bodies_computed;
-  }
+  for (const BodyState& body : results.bodies)
+    take_result(step + 1, slot_of(body.id), body, take_contacts(rest, body.id));
   store(step + 1, results_);
+}
+
+// The result of an own body for `step`; one that is there already changes nothing.
+void Timeline::take_result(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts) {
+  ++stats_.bodies_computed;
+  const Record* const old = at(step).produced.get(slot);
+  if (old && same(*old, body, contacts))
+    note_repaired(slot, body, step);  // healed, or at rest
+  else
+    results_.emplace_back(slot, make_record(body, contacts, arbiter_.place(body), step));
 }
 
 // New records of bodies produced at `step`, ascending by slot.

@@ -60,7 +60,6 @@ struct Found {
   std::vector<const Record*> foreign;  // the records of its foreign members; valid for the call only
   std::vector<Aabb> boxes;             // reach boxes of the own bodies
   bool wide = false;                   // an own body is wide
-  bool awake = false;                  // any body is awake
 };
 
 class Arbiter {
@@ -177,6 +176,7 @@ class Timeline {
   bool grown(Step step);
   void sort_out(Step step, bool all);
   void keep(Step step, std::uint32_t island, Ref<Island> members);
+  void take_result(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts);
   void store(Step step, std::vector<Table<Record>::Item>& items);
 
   const physics::Model& model_;
@@ -199,7 +199,6 @@ class Timeline {
   std::vector<Ref<Island>> old_islands_;
   std::vector<BodyState> bodies_;
   std::vector<const Record*> records_;
-  std::vector<Slot> slots_;
   std::vector<physics::Stepper::Records> previous_;
   std::vector<std::uint8_t> roles_;
   std::vector<ContactRecord> contacts_;
