@@ -388,6 +388,7 @@ std::size_t WorldCore::own_bodies() const { return impl_->timeline_.count(impl_-
 std::size_t WorldCore::own_cells() const { return impl_->neighbourhood_.own_cells(); }
 const CoreStats& WorldCore::stats() const { return impl_->stats(); }
 void WorldCore::touch(Step step, std::span<const BodyId> bodies) { impl_->touch(step, bodies); }
+bool WorldCore::is_indexed() const { return impl_->timeline_.is_indexed(); }
 std::uint64_t WorldCore::digest(Step step) const { return full_hash(impl_->timeline_.all_produced(step)); }
 
 }  // namespace soda::border

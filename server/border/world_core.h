@@ -127,6 +127,8 @@ class WorldCore {
   // Does step -> step + 1 of these bodies, and whatever that affects, again at the next work(), as if they had changed:
   // what comes out must be what is there. `step` from final_step() to below front(); unknown bodies do nothing.
   void touch(Step step, std::span<const BodyId> bodies);
+  // Whether all that is known would be found where it is looked for.
+  bool is_indexed() const;
   // Hash of all that was produced at a step from final_step() to clock(), contact records included.
   std::uint64_t digest(Step step) const;
 

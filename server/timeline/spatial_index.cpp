@@ -39,6 +39,27 @@ void SpatialIndex::note(Slot slot, const Vec3& centre, bool large, Step step) {
   if (!listed) cells_[key].push_back(slot);
 }
 
+void SpatialIndex::note_beside(Slot slot, const Vec3& centre, bool large, Step step) {
+  const Key key = large ? kEverywhere : key_of(centre);
+  newest_ = std::max(newest_, step);
+  if (now_.at(slot) == key) return;
+  beside_.insert(slot);
+  std::vector<Seen>& earlier = earlier_[slot];
+  const auto listed = std::find_if(earlier.begin(), earlier.end(), [&](const Seen& s) { return s.key == key; });
+  if (listed != earlier.end()) {
+    listed->last = kStill;
+    return;
+  }
+  earlier.push_back({key, kStill});
+  cells_[key].push_back(slot);
+}
+
+void SpatialIndex::not_beside(Slot slot) {
+  if (beside_.erase(slot) == 0) return;
+  for (Seen& s : earlier_[slot])
+    if (s.last == kStill) s.last = newest_;
+}
+
 void SpatialIndex::query(const Aabb& box, std::vector<Slot>& out) const {
   const auto visit = [&](Key key) {
     const auto cell = cells_.find(key);

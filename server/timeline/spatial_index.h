@@ -4,7 +4,9 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "common/ids.h"
@@ -26,6 +28,13 @@ class SpatialIndex {
   // those that a later step has taken over unchanged from the one before.
   void note(Slot slot, const Vec3& centre, bool large, Step step);
 
+  // As well as where it is noted now, the body has a state there: two worlds tell of it at the newest step, of which
+  // one must be wrong. Both places are kept until not_beside().
+  void note_beside(Slot slot, const Vec3& centre, bool large, Step step);
+  bool is_beside(Slot slot) const { return !beside_.empty() && beside_.contains(slot); }
+  // From the newest step on the body has a state where it is noted now, and nowhere else.
+  void not_beside(Slot slot);
+
   // Appends every body that may have a state whose box overlaps `box`; some twice.
   void query(const Aabb& box, std::vector<Slot>& out) const;
 
@@ -39,6 +48,7 @@ class SpatialIndex {
     Step last;  // a state there cannot be later
   };
   static constexpr Key kNowhere = ~Key{0}, kEverywhere = kNowhere - 1;
+  static constexpr Step kStill = std::numeric_limits<Step>::max();
   static Key key_of(std::int64_t x, std::int64_t y, std::int64_t z);
   Key key_of(const Vec3& centre) const;
   std::int64_t cell_along(double place) const;
@@ -49,6 +59,7 @@ class SpatialIndex {
   std::unordered_map<Key, std::vector<Slot>> cells_;
   std::vector<Key> now_;                                 // by slot: where it was noted last
   std::unordered_map<Slot, std::vector<Seen>> earlier_;  // and before that, within the window
+  std::unordered_set<Slot> beside_;                      // that have an earlier place with last == kStill
 };
 
 }  // namespace soda::timeline

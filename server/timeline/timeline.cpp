@@ -118,7 +118,10 @@ void Timeline::hear(std::size_t source, Step step, Ref<NearSet> set) {
   told = std::move(set);
   if (step < base_ || step > newest()) return;
   assume(source, step);
-  for (const NearSet::Body& b : told->bodies) note_repaired(b.slot, b.record->body, step);
+  for (const NearSet::Body& b : told->bodies) {
+    ever_heard_.add(b.slot);
+    note_repaired(b.slot, b.record->body, step);
+  }
 }
 
 // What the source says of `step`, or what follows from the step before, and so on as long as that changes anything.
@@ -135,10 +138,13 @@ void Timeline::assume(std::size_t source, Step step) {
       const bool old_only = n == now->bodies.end() || (o != known->bodies.end() && o->slot < n->slot);
       const bool new_only = !old_only && (o == known->bodies.end() || n->slot < o->slot);
       if (old_only || new_only || !same(*o->record, *n->record)) entry.pending.push_back(old_only ? o->slot : n->slot);
+      if (old_only && index_.is_beside(o->slot)) unsettled_.push_back(o->slot);
       if (!new_only) ++o;
       if (!old_only) ++n;
     }
     known = std::move(now);
+    for (const Slot slot : unsettled_) note_newest(slot);
+    unsettled_.clear();
   }
 }
 
@@ -151,24 +157,62 @@ void Timeline::extend() {
   for (std::size_t source = 0; source < told_.size(); ++source) {
     assume(source, newest());
     if (const auto told = told_[source].find(newest()); told != told_[source].end())
-      for (const NearSet::Body& b : told->second->bodies) note(b.slot, b.record->body, newest());
+      for (const NearSet::Body& b : told->second->bodies) {
+        ever_heard_.add(b.slot);
+        note_repaired(b.slot, b.record->body, newest());
+      }
   }
   arbiter_.extended(newest());
 }
 
-void Timeline::note(Slot slot, const BodyState& body, Step step) {
-  const physics::BodyModel& m = model_.bodies()[slot];
-  const double dt = model_.scene().dt;
+bool Timeline::is_large(Slot slot, const BodyState& body) const {
+  const double radius = model_.bodies()[slot].radius, dt = model_.scene().dt;
   const double reach =
-      m.radius * (1 + std::min(1.0, body.w().norm() * dt)) + body.v().norm() * dt + physics::kContactMargin;
-  index_.note(slot, body.x(), reach > index_.ordinary_reach(), step);
+      radius * (1 + std::min(1.0, body.w().norm() * dt)) + body.v().norm() * dt + physics::kContactMargin;
+  return reach > index_.ordinary_reach();
 }
+
+void Timeline::note(Slot slot, const BodyState& body) { index_.note(slot, body.x(), is_large(slot, body), newest()); }
 
 // The index must end with where the body is at the newest step, for entries to come copy that.
 void Timeline::note_repaired(Slot slot, const BodyState& body, Step step) {
-  note(slot, body, newest());
-  if (step == newest()) return;
-  if (const Record* const now = known(newest(), slot)) note(slot, now->body, newest());
+  note(slot, body);
+  if (ever_heard_.has(slot))
+    note_newest(slot);
+  else if (step != newest())
+    if (const Record* const now = produced(newest(), slot)) note(slot, now->body);
+}
+
+// Somebody may tell of a body that this world believes to have produced; until that is settled both count.
+void Timeline::note_newest(Slot slot) {
+  index_.not_beside(slot);
+  bool first = true;
+  const auto add = [&](const Record* record) {
+    if (!record) return;
+    if (std::exchange(first, false))
+      note(slot, record->body);
+    else
+      index_.note_beside(slot, record->body.x(), is_large(slot, record->body), newest());
+  };
+  const Entry& entry = entries_.back();
+  add(entry.produced.get(slot));
+  for (const Ref<NearSet>& heard : entry.heard) add(heard->find(slot));
+}
+
+bool Timeline::is_indexed() const {
+  std::vector<Slot> found;
+  const auto finds = [&](Slot slot, const Record& record) {
+    found.clear();
+    index_.query(physics::reach_box(record.body, model_), found);
+    return std::find(found.begin(), found.end(), slot) != found.end();
+  };
+  bool all = true;
+  for (const Entry& entry : entries_) {
+    entry.produced.for_each([&](Slot slot, const Ref<Record>& record) { all = all && finds(slot, *record); });
+    for (const Ref<NearSet>& heard : entry.heard)
+      for (const NearSet::Body& b : heard->bodies) all = all && finds(b.slot, *b.record);
+  }
+  return all;
 }
 
 // ---- the round: what must be done
@@ -222,6 +266,7 @@ void Timeline::take_away(Step step, Slot slot) {
   set_departed(next, slot, false);
   next.pending.push_back(slot);
   next.changed.push_back(slot);
+  if (index_.is_beside(slot)) note_newest(slot);
 }
 
 void Timeline::add_around(Step step, Slot slot) {

@@ -139,6 +139,9 @@ class Timeline {
   // Bodies whose produced record at `step` changed since the last call.
   std::vector<Slot> take_changed(Step step);
 
+  // For tests: the index finds every record of every entry.
+  bool is_indexed() const;
+
   // Entries before `step` are not needed any more.
   void release_before(Step step);
 
@@ -161,8 +164,10 @@ class Timeline {
   const Entry& at(Step step) const { return entries_.at(static_cast<std::size_t>(step - base_)); }
   void extend();
   void assume(std::size_t source, Step step);
-  void note(Slot slot, const BodyState& body, Step step);
+  bool is_large(Slot slot, const BodyState& body) const;
+  void note(Slot slot, const BodyState& body);
   void note_repaired(Slot slot, const BodyState& body, Step step);
+  void note_newest(Slot slot);
   void affect(Step step, Slot slot);
   void affect_island(Step step, Slot slot);
   void affect_touched(Step step, const Record& foreign);
@@ -184,6 +189,8 @@ class Timeline {
   Arbiter& arbiter_;
   physics::Stepper stepper_;
   SpatialIndex index_;
+  Marks ever_heard_;             // bodies that others have told of
+  std::vector<Slot> unsettled_;  // scratch of assume
   std::deque<Entry> entries_;
   Step base_ = 0;
   std::vector<std::map<Step, Ref<NearSet>>> told_;  // by source

@@ -5,6 +5,7 @@
 
 #include <tuple>
 
+#include "common/scene/generators.h"
 #include "common/scene/scene_builder.h"
 #include "tests/simulation/scenario.h"
 #include "tests/simulation/scenes.h"
@@ -111,6 +112,23 @@ TEST(Sleep, NothingIsSentForWhatSleeps) {
   ASSERT_EQ(half.failure, "");
   EXPECT_GT(half.total.frames_sent, 0u);
   EXPECT_EQ(slept.total.frames_sent, half.total.frames_sent) << "frames were sent for sleeping bodies";
+}
+
+// A body is handed over while its old owner is ahead, and falls asleep close by: for a while the old owner has records
+// of its own and those it is told. (Once it then looked for the body where its own had been, and the session stood
+// still.)
+TEST(Handover, WhatFallsAsleepAfterItIsFound) {
+  Scene scene = generate("piles", 2700, 1);
+  scene.territory_cell = 10.3;  // borders go through piles
+  constexpr Step kSteps = 260;
+  NetworkSettings network;
+  network.delay = 3;
+  network.touch_share = 0.05;
+  const SessionResult got = run_session(scene, 8, kSteps, network);
+  ASSERT_EQ(got.failure, "");
+  EXPECT_EQ(first_difference(run_single(scene, kSteps), got.steps), "");
+  EXPECT_GT(got.total.anticipated, 0u);
+  EXPECT_GT(got.total.departed, 0u);
 }
 
 TEST(MoreWorldsThanBodies, AreIdleButAgree) {

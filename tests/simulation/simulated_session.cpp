@@ -64,6 +64,9 @@ class Session {
         if (uniform() < slowness_[w]) continue;
         progress[w] = cores_[w]->work();
         moved = moved || progress[w] == border::Progress::kWorked;
+        if (network_.touch_share > 0 && progress[w] == border::Progress::kWorked && uniform() < network_.touch_share &&
+            !cores_[w]->is_indexed())
+          return fail("world " + std::to_string(w) + " would not find a body that it knows");
         if (network_.touch_share > 0 && progress[w] != border::Progress::kWorked && uniform() < network_.touch_share)
           if (!touch(*cores_[w])) return fail(result_.failure);
         for (border::Outgoing& out : cores_[w]->take_outgoing()) post(now, out);

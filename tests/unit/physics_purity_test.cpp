@@ -110,6 +110,28 @@ TEST_P(Purity, IslandsSolvedOneByOneInAnyOrder) {
   });
 }
 
+// Whoever looks for a body's partners looks within its reach box: a contact beyond it would be found by some and not by
+// others.
+TEST_P(Purity, EveryContactIsWithinReach) {
+  Stepper finder(model);
+  std::vector<ContactRecord> found;
+  std::size_t between_sleepers = 0;
+  for (int t = 1; t <= GetParam().steps; ++t) {
+    reference.step(state);
+    finder.find_contacts(state, {}, found);
+    for (const ContactRecord& record : found) {
+      if (record.with_static()) continue;
+      const BodyState &a = body(state, record.a), &b = body(state, record.b);
+      between_sleepers += a.asleep() && b.asleep();
+      ASSERT_TRUE(reach_box(a, model).overlaps(reach_box(b, model)))
+          << "step " << t << ": bodies " << a.id << " and " << b.id << (a.asleep() ? ", asleep" : "");
+    }
+  }
+  if (GetParam().sleeps) {
+    EXPECT_GT(between_sleepers, 0u);
+  }
+}
+
 // A closed subset: some islands of this step, with the records that their bodies own from the step before.
 BodySet subset_of(const BodySet& set, const std::vector<bool>& chosen) {
   BodySet subset;

@@ -78,6 +78,29 @@ TEST(SpatialIndex, FindsEveryStateOfTheWindow) {
   }
 }
 
+TEST(SpatialIndex, KeepsBothPlacesOfABodyThatTwoTellOf) {
+  const Vec3 here(0, 0, 0), there(9, 0, 0);
+  const auto finds = [](const SpatialIndex& index, const Vec3& x) {
+    std::vector<Slot> found;
+    index.query({x - Vec3::Constant(0.1), x + Vec3::Constant(0.1)}, found);
+    return std::count(found.begin(), found.end(), 3u) > 0;
+  };
+  SpatialIndex index(1);
+  index.note(3, there, false, 5);
+  index.note_beside(3, here, false, 5);  // asleep there, and so not noted again
+  EXPECT_TRUE(index.is_beside(3));
+  index.note(1, here, false, 60);
+  index.forget_before(40);
+  EXPECT_TRUE(finds(index, here));
+  EXPECT_TRUE(finds(index, there));
+  index.not_beside(3);
+  index.note(3, here, false, 60);  // it was here all the time
+  EXPECT_FALSE(index.is_beside(3));
+  index.forget_before(61);
+  EXPECT_TRUE(finds(index, here));
+  EXPECT_FALSE(finds(index, there));
+}
+
 // World 0 owns what is left of x = border; nothing waits, what has foreign bodies is kept for the test.
 class HalfSpace : public Arbiter {
  public:
