@@ -6,6 +6,8 @@
 namespace soda {
 namespace {
 
+constexpr double kMaxRadius = 1e7;  // m, of anything: as far as coordinates go
+
 double geometry_radius(const Geometry& geometry, const Pose& pose, const Vec3& centre) {
   struct Visitor {
     Pose pose;
@@ -100,6 +102,29 @@ Grid make_grid(const Scene& scene) {
     grid.origin[axis] = low[axis] - 0.5 * (grid.size[axis] * edge - extent[axis]);
   }
   return grid;
+}
+
+namespace {
+
+// A body's reach box reaches twice its radius at most (it may turn), and what it travels, and a margin: at least
+// physics::kContactMargin.
+constexpr double kMargin = 0.05;  // m
+
+}  // namespace
+
+int neighbour_range(const Scene& scene, const Grid& grid) {
+  double radius = 0;
+  for (const Body& body : scene.bodies)
+    if (!body.is_static) radius = std::max(radius, bounding_radius(scene, body));
+  const double reach = 2 * radius + scene.max_speed * scene.dt + kMargin;
+  return std::max(2, static_cast<int>(std::ceil(reach / grid.edge + 0.5)) + 1);
+}
+
+double largest_later_radius(const Scene& scene, const Grid& grid) {
+  if (grid.cells() == 1) return kMaxRadius;  // one world, whatever there is
+  const double reach = (neighbour_range(scene, grid) - 1.5) * grid.edge;
+  // A little less, so that rounding cannot matter.
+  return std::min(kMaxRadius, 0.5 * (1 - 1e-9) * (reach - scene.max_speed * scene.dt - kMargin));
 }
 
 }  // namespace soda

@@ -29,6 +29,12 @@ struct Grid {
 Grid make_grid(const Scene& scene);
 constexpr std::size_t kMaxCells = std::size_t{1} << 22;
 
+// Two worlds are neighbours if some of their cells are at most this many apart along each axis: the cells that a body
+// may travel and reach in a step, and half a one. A constant of the session: what is spawned later may not change it.
+int neighbour_range(const Scene& scene, const Grid& grid);
+// The largest bounding radius, m, that a body spawned later may have.
+double largest_later_radius(const Scene& scene, const Grid& grid);
+
 // Radius of the sphere about a body's centre of mass that holds all its shapes, m.
 double bounding_radius(const Scene& scene, const Body& body);
 

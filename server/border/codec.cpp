@@ -141,6 +141,28 @@ Part get_part(Reader& in, std::span<const std::byte>& rest, const physics::Model
   return part;
 }
 
+Header get_header(Reader& in) {
+  if (in.get<std::uint32_t>("magic") != kMagic) throw CodecError("not a SODA border message");
+  if (const auto version = in.get<std::uint32_t>("version"); version != kCodecVersion)
+    throw CodecError("border message of version " + std::to_string(version) + ", this is " +
+                     std::to_string(kCodecVersion));
+  Header h;
+  h.session = in.get<std::uint64_t>("session");
+  h.from = in.get<WorldId>("from");
+  h.to = in.get<WorldId>("to");
+  h.epoch = in.get<std::uint32_t>("epoch");
+  h.to_epoch = in.get<std::uint32_t>("to_epoch");
+  h.sequence = in.get<std::uint64_t>("sequence");
+  h.ack = in.get<std::uint64_t>("ack");
+  h.need = in.get<std::uint8_t>("need") != 0;
+  h.upto = in.get<Step>("upto");
+  h.final_step = in.get<Step>("final");
+  h.near_final = in.get<Step>("near final");
+  h.durable = in.get<Step>("durable");
+  h.logged = in.get<ActionNumber>("logged");
+  return h;
+}
+
 // Every contact is between bodies that are there; in a frame its partner may be elsewhere.
 void check_ends(const BodySet& set, const std::vector<Port>& ports, bool owner_only) {
   const auto there = [&](BodyId id) {
@@ -221,6 +243,7 @@ std::vector<std::byte> encode(const Message& message) {
   put(out, h.final_step);
   put(out, h.near_final);
   put(out, h.durable);
+  put(out, h.logged);
   put(out, static_cast<std::uint32_t>(message.frames.size()));
   put(out, static_cast<std::uint32_t>(message.parts.size()));
   put(out, static_cast<std::uint32_t>(message.finals.size()));
@@ -234,27 +257,16 @@ std::vector<std::byte> encode(const Message& message) {
   return out;
 }
 
+Header decode_header(std::span<const std::byte> bytes) {
+  Reader in(bytes);
+  return get_header(in);
+}
+
 Message decode(std::span<const std::byte> bytes, const physics::Model& model) {
   std::span<const std::byte> rest = bytes;
   Reader in(rest);
-  if (in.get<std::uint32_t>("magic") != kMagic) throw CodecError("not a SODA border message");
-  if (const auto version = in.get<std::uint32_t>("version"); version != kCodecVersion)
-    throw CodecError("border message of version " + std::to_string(version) + ", this is " +
-                     std::to_string(kCodecVersion));
   Message message;
-  Header& h = message.header;
-  h.session = in.get<std::uint64_t>("session");
-  h.from = in.get<WorldId>("from");
-  h.to = in.get<WorldId>("to");
-  h.epoch = in.get<std::uint32_t>("epoch");
-  h.to_epoch = in.get<std::uint32_t>("to_epoch");
-  h.sequence = in.get<std::uint64_t>("sequence");
-  h.ack = in.get<std::uint64_t>("ack");
-  h.need = in.get<std::uint8_t>("need") != 0;
-  h.upto = in.get<Step>("upto");
-  h.final_step = in.get<Step>("final");
-  h.near_final = in.get<Step>("near final");
-  h.durable = in.get<Step>("durable");
+  message.header = get_header(in);
   const std::size_t frames = in.count(24, "frames"), parts = in.count(24, "parts"),
                     finals = in.count(20, "final parts");
   for (std::size_t i = 0; i < frames; ++i) message.frames.push_back(get_frame(in, rest, model));

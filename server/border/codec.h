@@ -12,7 +12,7 @@
 
 namespace soda::border {
 
-constexpr std::uint32_t kCodecVersion = 2;
+constexpr std::uint32_t kCodecVersion = 3;
 
 // What was received is not a message: says which field and why.
 struct CodecError : std::runtime_error {
@@ -24,6 +24,9 @@ std::vector<std::byte> encode(const Message& message);
 // Throws CodecError for anything cut short, too long, out of order, not finite, or about bodies that `model` does not
 // have. What it returns can be trusted to be well-formed, not to be true.
 Message decode(std::span<const std::byte> bytes, const physics::Model& model);
+
+// The beginning alone: who speaks to whom.
+Header decode_header(std::span<const std::byte> bytes);
 
 // Throws CodecError where a well-formed message does not fit a session of that many worlds: unknown owners, contacts
 // between bodies that are not there.

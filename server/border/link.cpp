@@ -31,11 +31,13 @@ Header Link::header(std::uint64_t sequence, bool need) const {
   return h;
 }
 
-void Link::send(Step upto, Step final_step, Step near_final, std::vector<std::vector<std::byte>>& out) {
+void Link::send(Step upto, Step final_step, Step near_final, ActionNumber logged,
+                std::vector<std::vector<std::byte>>& out) {
   told_upto_ = upto;
   told_final_ = final_step;
   told_near_final_ = near_final;
   next_.header = header(++sent_, false);
+  next_.header.logged = logged;
   log_.push_back(encode(next_));
   out.push_back(log_.back());
   next_.frames.clear();

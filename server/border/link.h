@@ -29,7 +29,7 @@ class Link {
   Step told_final() const { return told_final_; }
   Step told_near_final() const { return told_near_final_; }
   // Closes the next message of the stream and appends it, as bytes, to `out`.
-  void send(Step upto, Step final_step, Step near_final, std::vector<std::vector<std::byte>>& out);
+  void send(Step upto, Step final_step, Step near_final, ActionNumber logged, std::vector<std::vector<std::byte>>& out);
   // Asks the peer for what is missing here, and repeats what it has not acknowledged, at the next collect().
   void interrupted();
   // Appends requests and repetitions that are due.

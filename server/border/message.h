@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/actions/action.h"
 #include "common/body_set.h"
 #include "common/ids.h"
 
@@ -63,8 +64,10 @@ struct Header {
   bool need = false;           // the sender asks for everything after `ack` again
   Step upto = 0;               // the sender's front: all states up to it are computed and told; can fall
   Step final_step = 0;
-  Step near_final = 0;  // up to this step the sender's parts will not change any more
-  Step durable = 0;     // for checkpoints, later
+  Step near_final = 0;      // up to this step the sender's parts will not change any more
+  Step durable = 0;         // for checkpoints, later
+  ActionNumber logged = 0;  // the sender has acted on the action log up to this number: what it tells may be of bodies
+                            // that are spawned there
 };
 
 // Everything from one world to another is one numbered stream of these.

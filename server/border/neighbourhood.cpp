@@ -1,34 +1,17 @@
 #include "server/border/neighbourhood.h"
 
 #include <algorithm>
-#include <cmath>
 
+#include "common/grid.h"
 #include "server/physics/stepper.h"
 #include "server/physics/tuning.h"
 
 namespace soda::border {
-namespace {
-
-// How far a body's reach box can reach from its centre, m.
-double largest_reach(const physics::Model& model) {
-  double radius = 0;
-  for (const physics::BodyModel& m : model.bodies()) radius = std::max(radius, m.radius);
-  // Turning adds the radius once more at most (physics::reach_box).
-  return 2 * radius + model.scene().max_speed * model.scene().dt + physics::kContactMargin;
-}
-
-}  // namespace
-
 Neighbourhood::Neighbourhood(const physics::Model& model, const TerritoryMap& map, WorldId me)
     : model_(model), map_(map), me_(me), half_edge_(0.5 * map.grid.edge) {
   const Grid& grid = map.grid;
-  // From a cell of the owner at t: one cell that the body may travel, its reach, and half a cell.
-  const int range = std::max(2, static_cast<int>(std::ceil(largest_reach(model) / grid.edge + 0.5)) + 1);
-
-  for (const physics::BodyModel& m : model.bodies()) {
-    const double room = (half_edge_ - 2 * m.radius - physics::kContactMargin) / model.scene().dt;
-    ordinary_below_.push_back(room > 0 ? room * room : -1);
-  }
+  const int range = neighbour_range(model.scene(), grid);
+  model_grew();
 
   // Cells near ours, axis by axis: dilating along each axis in turn gives the cube.
   std::vector<std::uint8_t> near(grid.cells(), 0);
@@ -65,6 +48,13 @@ Neighbourhood::Neighbourhood(const physics::Model& model, const TerritoryMap& ma
               sole = map.owner[grid.index({i, j, k})] == owner;
         if (sole) sole_[grid.index({x, y, z})] = owner;
       }
+}
+
+void Neighbourhood::model_grew() {
+  for (const physics::BodyModel& m : model_.bodies().subspan(ordinary_below_.size())) {
+    const double room = (half_edge_ - 2 * m.radius - physics::kContactMargin) / model_.scene().dt;
+    ordinary_below_.push_back(room > 0 ? room * room : -1);
+  }
 }
 
 timeline::Place Neighbourhood::place(const BodyState& body) const {

@@ -16,6 +16,9 @@ class Neighbourhood {
   // `model` and `map` must outlive it.
   Neighbourhood(const physics::Model& model, const TerritoryMap& map, WorldId me);
 
+  // A body has been added to the model.
+  void model_grew();
+
   // Worlds with a cell so near to one of ours that a body can matter to both: within two cells, or more where the
   // scene's largest body, or its largest speed, reaches further. Ascending.
   const std::vector<WorldId>& neighbours() const { return neighbours_; }

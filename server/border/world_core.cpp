@@ -17,7 +17,7 @@ namespace soda::border {
 
 class WorldCore::Impl final : timeline::Arbiter {
  public:
-  Impl(const physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer)
+  Impl(physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer)
       : model_(model),
         map_(map),
         settings_(settings),
@@ -29,23 +29,33 @@ class WorldCore::Impl final : timeline::Arbiter {
         settler_(context_),
         timeline_(model, settings.me, links_.size(), *this) {
     final_ = 0;  // the scene
+    closed_ = settings.actions ? 0 : std::numeric_limits<Step>::max();
   }
 
   // ---- what comes in
   bool receive(std::span<const std::byte> bytes) {
     try {
-      Message message = decode(bytes, model_);
-      const Header& h = message.header;
+      const Header h = decode_header(bytes);
       if (h.session != settings_.session)
         throw CodecError("border message of another session (scene, worlds or steps differ)");
       if (h.to != settings_.me) throw CodecError("border message for world " + std::to_string(h.to));
       Link* link = context_.link_to(h.from);
       if (!link) throw CodecError("border message from world " + std::to_string(h.from) + ", which is no neighbour");
+      if (h.logged > logged_) return hold_back(bytes);
+      Message message = decode(bytes, model_);
       check(message, settings_.me, map_.worlds);
       return take(*link, std::move(message));
     } catch (const CodecError& error) {
       return refuse(error);
     }
+  }
+
+  // It may be of bodies that are not known here yet. What is lost for want of room is asked for again.
+  bool hold_back(std::span<const std::byte> bytes) {
+    constexpr std::size_t kAtMost = 4096;
+    ++stats_.held_back;
+    if (held_back_.size() < kAtMost) held_back_.emplace_back(bytes.begin(), bytes.end());
+    return true;
   }
 
   bool refuse(const CodecError& error) {
@@ -81,6 +91,41 @@ class WorldCore::Impl final : timeline::Arbiter {
     if (std::exchange(limit_, newest) != newest) changed();
   }
 
+  // ---- actions
+  bool act(const LoggedAction& action) {
+    if (action.number != logged_ + 1) return false;
+    if (action.step <= std::max(closed_, final_))
+      throw ProtocolError("action " + std::to_string(action.number) + " is for step " + std::to_string(action.step) +
+                          ", which is closed");
+    if (const auto* spawn = std::get_if<Spawn>(&action.action)) {
+      model_.add(spawn->body);
+      neighbourhood_.model_grew();
+    }
+    timeline_.act(action);
+    ++logged_;
+    ++stats_.actions;
+    deferred_.clear();
+    changed();
+    close();
+    for (const auto& bytes : std::exchange(held_back_, {})) (void)receive(bytes);
+    return true;
+  }
+
+  void close_actions(Step step, ActionNumber logged) {
+    closings_.emplace_back(step, logged);
+    close();
+  }
+
+  void close() {
+    const Step before = closed_;
+    std::erase_if(closings_, [&](const auto& closing) {
+      if (closing.second > logged_) return false;
+      closed_ = std::max(closed_, closing.first);
+      return true;
+    });
+    if (closed_ != before) changed();
+  }
+
   // ---- work
   Progress work() {
     if (!std::exchange(begun_, true)) observer_.finalised(0, Produced(timeline_, 0));
@@ -93,7 +138,8 @@ class WorldCore::Impl final : timeline::Arbiter {
     idle_ = !worked && !more_final;
     if (worked || more_final) return Progress::kWorked;
     if (final_ == settings_.last_step && context_.near_final(final_)) return Progress::kDone;
-    return timeline_.newest() >= limit_ && limit_ < settings_.last_step ? Progress::kAtLimit : Progress::kWaiting;
+    const bool limited = timeline_.newest() >= limit_ && limit_ < settings_.last_step;
+    return limited || (final_ >= closed_ && final_ < settings_.last_step) ? Progress::kAtLimit : Progress::kWaiting;
   }
 
   // The earliest step first, newer ones while nothing can be done there.
@@ -102,7 +148,8 @@ class WorldCore::Impl final : timeline::Arbiter {
       timeline_.finish();
       return true;
     }
-    const Step end = std::min({settings_.last_step, limit_, final_ + settings_.window});
+    Step end = std::min({settings_.last_step, limit_, final_ + settings_.window});
+    if (settings_.sync == Sync::kConservative) end = std::min(end, closed_);
     for (Step step = final_; step < end && step <= timeline_.newest(); ++step) {
       if (!may_process(step)) return false;
       if ((timeline_.has_pending(step) || step == timeline_.newest()) && is_worth(step)) {
@@ -185,7 +232,7 @@ class WorldCore::Impl final : timeline::Arbiter {
       // carries them.
       const bool final_news = link.told_final() != final_ || link.told_near_final() != near_final_;
       if (link.has_content() || link.told_upto() != front() || (waiting && final_news))
-        link.send(front(), final_, near_final_, messages);
+        link.send(front(), final_, near_final_, logged_, messages);
       for (auto& bytes : messages) {
         ++stats_.messages_sent;
         stats_.bytes_sent += bytes.size();
@@ -224,6 +271,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     for (const Link& link : links_)
       text += "world " + std::to_string(link.peer()) + ": upto " + std::to_string(link.upto()) + ", final " +
               std::to_string(link.final_step()) + ", near final " + std::to_string(link.near_final()) + "; ";
+    if (closed_ <= final_) text += "actions are closed up to step " + std::to_string(closed_) + "; ";
     if (timeline_.unfinished() == final_) text += "a round is not finished; ";
     if (timeline_.has_pending(final_)) text += std::to_string(timeline_.pending(final_).size()) + " bodies to do; ";
     return text + settler_.why_not_final(final_);
@@ -318,8 +366,8 @@ class WorldCore::Impl final : timeline::Arbiter {
   // State t + 1 is final when state t is final here and with every neighbour, nothing of step t is to be done, and all
   // that others have told for it is final.
   void finalise() {
-    while (final_ < timeline_.newest() && context_.near_final(final_) && !timeline_.has_pending(final_) &&
-           timeline_.unfinished() != final_ && settler_.all_final(final_))
+    while (final_ < std::min(timeline_.newest(), closed_) && context_.near_final(final_) &&
+           !timeline_.has_pending(final_) && timeline_.unfinished() != final_ && settler_.all_final(final_))
       make_final(final_ + 1);
   }
 
@@ -348,13 +396,17 @@ class WorldCore::Impl final : timeline::Arbiter {
         stats_.arrived += b.record->place.owner == settings_.me;
   }
 
-  const physics::Model& model_;
+  physics::Model& model_;
   const TerritoryMap& map_;
   const CoreSettings settings_;
   Observer& observer_;
   CoreStats stats_;
   std::string refusal_;
   Step final_ = -1, near_final_ = -1, limit_ = std::numeric_limits<Step>::max();
+  ActionNumber logged_ = 0;
+  Step closed_;                                          // no action comes for steps up to this one
+  std::vector<std::pair<Step, ActionNumber>> closings_;  // that presuppose entries of the log which have not come yet
+  std::vector<std::vector<std::byte>> held_back_;        // messages, likewise
   bool begun_ = false;
   std::map<Step, std::size_t> deferred_;  // steps that were not worth doing, with so many pending bodies
   bool idle_ = false;                     // nothing can be done before something comes
@@ -368,13 +420,15 @@ class WorldCore::Impl final : timeline::Arbiter {
   timeline::Timeline timeline_;
 };
 
-WorldCore::WorldCore(const physics::Model& model, const TerritoryMap& map, const CoreSettings& settings,
-                     Observer& observer)
+WorldCore::WorldCore(physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer)
     : impl_(std::make_unique<Impl>(model, map, settings, observer)) {}
 WorldCore::~WorldCore() = default;
 bool WorldCore::receive(std::span<const std::byte> message) { return impl_->receive(message); }
 const std::string& WorldCore::last_refusal() const { return impl_->refusal_; }
 void WorldCore::reconnect(WorldId neighbour) { impl_->reconnect(neighbour); }
+bool WorldCore::act(const LoggedAction& action) { return impl_->act(action); }
+void WorldCore::close_actions(Step step, ActionNumber logged) { impl_->close_actions(step, logged); }
+ActionNumber WorldCore::logged() const { return impl_->logged_; }
 void WorldCore::set_limit(Step newest) { impl_->set_limit(newest); }
 Progress WorldCore::work() { return impl_->work(); }
 std::vector<Outgoing> WorldCore::take_outgoing() { return impl_->take_outgoing(); }

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "common/actions/action.h"
 #include "common/body_set.h"
 #include "common/ids.h"
 #include "common/territory.h"
@@ -31,7 +32,8 @@ struct CoreSettings {
                               // messages are refused
   Step last_step = 0;         // the run ends when this step is final
   Sync sync = Sync::kAnticipative;
-  Step window = 48;  // K: steps beyond the final one that may be computed
+  Step window = 48;      // K: steps beyond the final one that may be computed
+  bool actions = false;  // no step becomes final before close_actions() has said that nothing will be done at it
 };
 
 struct CoreStats {
@@ -50,6 +52,8 @@ struct CoreStats {
   // Results computed here that were slowed to the scene's largest speed, or held because they were not finite: those of
   // other worlds' bodies in mixed islands and those done again count, too.
   std::uint64_t clamped = 0, non_finite = 0;
+  std::uint64_t actions = 0;      // entries of the action log acted on
+  std::uint64_t held_back = 0;    // messages that came before actions which they presuppose
   std::uint64_t anticipated = 0;  // steps computed before all neighbours were known to have reached them
   timeline::TimelineStats timeline;
 };
@@ -84,15 +88,15 @@ struct Outgoing {
 enum class Progress {
   kWorked,   // something was done; call again
   kWaiting,  // nothing to do until a message comes
-  kAtLimit,  // the clock is at the limit set by set_limit
+  kAtLimit,  // the clock is at the limit set by set_limit, or the next final step is not closed for actions
   kDone,     // last_step is final here, and every neighbour has said the same
 };
 
 class WorldCore {
  public:
-  // `model`, `map` and `observer` must outlive the core. The bodies of state 0 are the scene's whose centres of mass
-  // lie in this world's territory.
-  WorldCore(const physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer);
+  // `model`, `map` and `observer` must outlive the core; bodies that are spawned are added to the model. The bodies of
+  // state 0 are the scene's whose centres of mass lie in this world's territory.
+  WorldCore(physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer);
   ~WorldCore();
 
   // ---- in
@@ -106,6 +110,13 @@ class WorldCore {
   void reconnect(WorldId neighbour);
   // The clock does not pass this step (pacing). By default there is no limit.
   void set_limit(Step newest);
+
+  // The session's action log, entry by entry. False: it is not the next one (known already, or others are missing), and
+  // nothing has changed; `logged()` entries are known. Throws ProtocolError where it is for a step that is closed.
+  bool act(const LoggedAction& action);
+  // Everything that is done at steps up to `step` is among the first `logged` entries of the log.
+  void close_actions(Step step, ActionNumber logged);
+  ActionNumber logged() const;
 
   // ---- work: at most one step's worth, then returns
   Progress work();

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <utility>
 
 #include "common/grid.h"
 
@@ -29,9 +31,9 @@ Model::Model(Scene scene) : scene_(std::move(scene)) {
   std::sort(scene_.bodies.begin(), scene_.bodies.end(), [](const Body& l, const Body& r) { return l.id < r.id; });
   std::vector<double> radii;
   for (const Body& body : scene_.bodies) {
-    const auto children = static_cast<std::uint32_t>(body.shapes.size());
-    const std::uint32_t first = shapes_.add(scene_, body);
     if (body.is_static) {
+      const auto children = static_cast<std::uint32_t>(body.shapes.size());
+      const std::uint32_t first = shapes_.add(scene_, body);
       StaticModel s;
       s.id = body.id;
       s.pose = {body.pose.position, normalized(body.pose.orientation)};
@@ -44,26 +46,8 @@ Model::Model(Scene scene) : scene_(std::move(scene)) {
       statics_.push_back(s);
       continue;
     }
-    BodyModel m;
-    m.id = body.id;
-    m.mass = body.inertial.mass;
-    m.inverse_mass = 1 / m.mass;
-    m.inertia = body.inertial.inertia;
-    m.inverse_inertia = m.inertia.inverse();
-    m.isotropic = is_isotropic(m.inertia);
-    m.friction = body.friction;
-    m.restitution = body.restitution;
-    m.linear_damping = body.linear_damping;
-    m.angular_damping = body.angular_damping;
-    m.first_child = first;
-    m.children = children;
-    m.radius = bounding_radius(scene_, body);
-    m.inner_extent = m.radius;
-    for (const Child& child : shapes_.children(first, children))
-      m.inner_extent = std::min(m.inner_extent, child.inner_extent);
-    m.drive = body.drive ? &*body.drive : nullptr;
-    radii.push_back(m.radius);
-    bodies_.push_back(m);
+    add_dynamic(scene_, body);
+    radii.push_back(bodies_.back().radius);
   }
   if (radii.empty()) return;
   diameter_ = 2 * largest_ordinary_radius(radii);
@@ -74,6 +58,42 @@ Model::Model(Scene scene) : scene_(std::move(scene)) {
   }
 }
 
+void Model::add_dynamic(const Scene& scene, const Body& body) {
+  const auto children = static_cast<std::uint32_t>(body.shapes.size());
+  const std::uint32_t first = shapes_.add(scene, body);
+  BodyModel m;
+  m.id = body.id;
+  m.mass = body.inertial.mass;
+  m.inverse_mass = 1 / m.mass;
+  m.inertia = body.inertial.inertia;
+  m.inverse_inertia = m.inertia.inverse();
+  m.isotropic = is_isotropic(m.inertia);
+  m.friction = body.friction;
+  m.restitution = body.restitution;
+  m.linear_damping = body.linear_damping;
+  m.angular_damping = body.angular_damping;
+  m.first_child = first;
+  m.children = children;
+  m.radius = bounding_radius(scene, body);
+  m.inner_extent = m.radius;
+  for (const Child& child : shapes_.children(first, children))
+    m.inner_extent = std::min(m.inner_extent, child.inner_extent);
+  m.drive = body.drive ? &*body.drive : nullptr;
+  bodies_.push_back(m);
+}
+
+void Model::add(std::shared_ptr<const Scene> alone) {
+  const Body& body = alone->bodies.at(0);
+  if (body.is_static || (!bodies_.empty() && body.id <= bodies_.back().id))
+    throw std::invalid_argument("a body added to a model must be dynamic and have the largest id");
+  add_dynamic(*alone, body);
+  added_.push_back(std::move(alone));
+  if (index_.empty()) return;
+  if (body.id / kTableFactor > bodies_.size()) return index_.clear();
+  index_.resize(body.id + 1, kNone);
+  index_[body.id] = static_cast<std::uint32_t>(bodies_.size() - 1);
+}
+
 const BodyModel* Model::find(BodyId id) const {
   if (index_.empty()) return find_by_id(bodies_, id);
   if (id >= index_.size() || index_[id] == kNone) return nullptr;
@@ -82,20 +102,22 @@ const BodyModel* Model::find(BodyId id) const {
 
 const StaticModel* Model::find_static(BodyId id) const { return find_by_id(statics_, id); }
 
+BodyState Model::state_of(const Body& body) {
+  BodyState s;
+  s.id = body.id;
+  const Quat q = normalized(body.pose.orientation);
+  s.set_x(body.pose.position + q * body.inertial.centre);
+  s.set_q(q);
+  s.set_v(body.linear_velocity);
+  s.set_w(body.angular_velocity);
+  return s;
+}
+
 BodySet Model::initial_state() const {
   BodySet set;
   set.bodies.reserve(bodies_.size());
-  for (const Body& body : scene_.bodies) {
-    if (body.is_static) continue;
-    BodyState s;
-    s.id = body.id;
-    const Quat q = normalized(body.pose.orientation);
-    s.set_x(body.pose.position + q * body.inertial.centre);
-    s.set_q(q);
-    s.set_v(body.linear_velocity);
-    s.set_w(body.angular_velocity);
-    set.bodies.push_back(s);
-  }
+  for (const Body& body : scene_.bodies)
+    if (!body.is_static) set.bodies.push_back(state_of(body));
   return set;
 }
 

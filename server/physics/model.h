@@ -1,4 +1,4 @@
-// A scene prepared for stepping: everything that does not change during a run. Immutable and shared by all threads.
+// A scene prepared for stepping: everything that does not change during a run but by bodies that are added.
 #pragma once
 
 #include <cstdint>
@@ -51,12 +51,21 @@ class Model {
   std::span<const BodyModel> bodies() const { return bodies_; }      // ascending by id
   std::span<const StaticModel> statics() const { return statics_; }  // ascending by id
   const ShapeStore& shapes() const { return shapes_; }
-  BodySet initial_state() const;  // state 0 of all dynamic bodies
+  BodySet initial_state() const;  // state 0 of the scene's dynamic bodies
+
+  // A body that is not in the scene: `alone` is a scene of that one dynamic body, whose id is larger than all others.
+  // Pointers and spans to bodies do not survive it. The scene's constants stay those of the scene.
+  void add(std::shared_ptr<const Scene> alone);
+
+  // State of a body where its scene puts it.
+  static BodyState state_of(const Body& body);
 
   double largest_ordinary_diameter() const { return diameter_; }  // m, D of the canonical constraint order
 
  private:
+  void add_dynamic(const Scene& scene, const Body& body);
   Scene scene_;
+  std::vector<std::shared_ptr<const Scene>> added_;
   ShapeStore shapes_;
   std::vector<BodyModel> bodies_;
   std::vector<StaticModel> statics_;

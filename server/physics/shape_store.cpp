@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <limits>
 #include <unordered_map>
+#include <utility>
 
 #include "server/physics/polytope.h"
 #include "server/physics/triangle_surface.h"
@@ -24,6 +25,7 @@ btVector3 to_bullet(const Vec3& v) { return btVector3(v.x(), v.y(), v.z()); }
 
 // Bodies share what is made from one geometry.
 struct ShapeStore::Owned {
+  const Scene* scene = nullptr;                       // whose geometries they are
   std::unordered_map<std::uint32_t, Child> prepared;  // by index of the geometry; with neither pose
   std::vector<std::unique_ptr<btConvexShape>> shapes;
   std::vector<std::unique_ptr<Polytope>> polytopes;
@@ -119,6 +121,7 @@ void ShapeStore::prepare(const Geometry& geometry, Child& child) {
 
 std::uint32_t ShapeStore::add(const Scene& scene, const Body& body) {
   const auto first = static_cast<std::uint32_t>(children_.size());
+  if (std::exchange(owned_->scene, &scene) != &scene) owned_->prepared.clear();
   for (const Shape& shape : body.shapes) {
     const Geometry& geometry = scene.geometries[shape.geometry];
     const auto [prepared, is_new] = owned_->prepared.try_emplace(shape.geometry);

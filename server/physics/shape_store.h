@@ -48,6 +48,7 @@ class ShapeStore {
   ShapeStore& operator=(const ShapeStore&) = delete;
 
   // Adds a body's shapes as children, with poses relative to its centre of mass; returns the index of the first.
+  // Bodies of one scene that share a geometry share what is made of it, as long as no other scene's come in between.
   std::uint32_t add(const Scene& scene, const Body& body);
   std::span<const Child> children() const { return children_; }
   std::span<const Child> children(std::uint32_t first, std::uint32_t count) const {

@@ -102,6 +102,7 @@ Party Stepper::party(const StaticModel& fixed) const {
 void Stepper::assign_slots(std::span<const BodyState> bodies) {
   for (const std::uint32_t used : slots_in_use_) slots_[used] = kStaticSlot;
   slots_in_use_.clear();
+  slots_.resize(model_.bodies().size(), kStaticSlot);
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     const BodyModel* const m = model_.find(bodies[i].id);
     if (!m) throw std::invalid_argument("step: body " + std::to_string(bodies[i].id) + " is not in the scene");

@@ -53,7 +53,13 @@ bool same(const NearSet& l, const NearSet& r) {
 }
 
 Timeline::Timeline(const physics::Model& model, WorldId me, std::size_t sources, Arbiter& arbiter)
-    : model_(model), me_(me), arbiter_(arbiter), stepper_(model), index_(index_cell(model)), told_(sources) {
+    : model_(model),
+      me_(me),
+      arbiter_(arbiter),
+      stepper_(model),
+      index_(index_cell(model)),
+      told_(sources),
+      effects_(model) {
   Entry& first = entries_.emplace_back();
   first.produced = Table<Record>(model.bodies().size());
   first.islands = Table<Island>(model.bodies().size());
@@ -108,6 +114,7 @@ void Timeline::release_before(Step step) {
     ++base_;
   }
   for (auto& told : told_) told.erase(told.begin(), told.lower_bound(base_));
+  effects_.forget_before(base_);
   index_.forget_before(base_);
 }
 
@@ -152,6 +159,7 @@ void Timeline::extend() {
   Entry next = entries_.back();
   next.pending.clear();
   next.changed.clear();
+  next.raw.clear();
   entries_.push_back(std::move(next));
   ++stats_.steps;
   for (std::size_t source = 0; source < told_.size(); ++source) {
@@ -163,6 +171,8 @@ void Timeline::extend() {
       }
   }
   arbiter_.extended(newest());
+  // What nothing pending touches has its result already.
+  for (const Slot slot : effects_.acted_on(newest())) do_actions(newest(), slot);
 }
 
 bool Timeline::is_large(Slot slot, const BodyState& body) const {
@@ -215,6 +225,44 @@ bool Timeline::is_indexed() const {
   return all;
 }
 
+// ---- what users do
+// ---------------------------------------------------------------------------------------------------
+
+void Timeline::act(const LoggedAction& action) {
+  for (const Effects::Change& change : effects_.add(action))
+    for (Step step = std::max(change.first, base_ + 1); step <= std::min(change.last, newest()); ++step)
+      do_actions(step, change.slot);
+}
+
+// The record of a body for which something is done at the step: none if it is taken away, or somebody else's to
+// produce.
+Ref<Record> Timeline::after_actions(Step step, Slot slot, const Record* raw) const {
+  std::optional<BodyState> state;
+  const bool given = effects_.gives(step, slot, state);
+  if (!given && raw) state = raw->body;
+  if (!state || (given && arbiter_.place(*state).owner != me_)) return {};
+  effects_.apply(step, slot, *state);
+  return make_record(*state, given ? std::span<const ContactRecord>() : raw->contacts(), arbiter_.place(*state), step);
+}
+
+// Does what is done to a body at a step again, with the result that is known.
+void Timeline::do_actions(Step step, Slot slot) {
+  Entry& entry = at(step);
+  const Record* const before = entry.produced.get(slot);
+  const auto kept = entry.raw.find(slot);
+  const Ref<Record> raw = kept != entry.raw.end() ? kept->second : Ref<Record>(entry.produced.get(slot));
+  if (raw) entry.raw.insert_or_assign(slot, raw);
+  Ref<Record> now = after_actions(step, slot, raw.get());
+  if (before && now && same(*before, *now)) return;
+  if (now) {
+    results_.clear();
+    results_.emplace_back(slot, std::move(now));
+    store(step, results_);
+  } else {
+    drop(step, slot);
+  }
+}
+
 // ---- the round: what must be done
 
 void Timeline::touch(Step step, std::span<const Slot> slots) {
@@ -255,17 +303,26 @@ void Timeline::set_departed(Entry& entry, Slot slot, bool departed) {
   if (!departed && was) entry.departed.erase(at);
 }
 
-// A body that is not own at a step has no result here.
+// A body that is not own at a step has no result here, but where an action gives it one.
 void Timeline::take_away(Step step, Slot slot) {
-  Entry& next = at(step + 1);
-  const Record* const result = next.produced.get(slot);
-  if (!result) return;
-  --next.count;
-  next.hash -= result->hash;
-  next.produced.set(slot, {});
-  set_departed(next, slot, false);
-  next.pending.push_back(slot);
-  next.changed.push_back(slot);
+  std::optional<BodyState> given;
+  if (effects_.acts_on(step + 1, slot)) {
+    at(step + 1).raw.erase(slot);
+    if (effects_.gives(step + 1, slot, given)) return;
+  }
+  drop(step + 1, slot);
+}
+
+void Timeline::drop(Step step, Slot slot) {
+  Entry& entry = at(step);
+  const Record* const record = entry.produced.get(slot);
+  if (!record) return;
+  --entry.count;
+  entry.hash -= record->hash;
+  entry.produced.set(slot, {});
+  set_departed(entry, slot, false);
+  entry.pending.push_back(slot);
+  entry.changed.push_back(slot);
   if (index_.is_beside(slot)) note_newest(slot);
 }
 
@@ -476,11 +533,25 @@ void Timeline::settle(Step step, const BodySet& results) {
 // The result of an own body for `step`; one that is there already changes nothing.
 void Timeline::take_result(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts) {
   ++stats_.bodies_computed;
+  if (effects_.acts_on(step, slot)) return take_acted(step, slot, body, contacts);
   const Record* const old = at(step).produced.get(slot);
   if (old && same(*old, body, contacts))
     note_repaired(slot, body, step);  // healed, or at rest
   else
     results_.emplace_back(slot, make_record(body, contacts, arbiter_.place(body), step));
+}
+
+void Timeline::take_acted(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts) {
+  Entry& entry = at(step);
+  Ref<Record>& raw = entry.raw[slot];
+  if (raw && same(*raw, body, contacts)) return;  // healed
+  raw = make_record(body, contacts, arbiter_.place(body), step);
+  const Record* const before = entry.produced.get(slot);
+  Ref<Record> now = after_actions(step, slot, raw.get());
+  if (!now)
+    drop(step, slot);
+  else if (!before || !same(*before, *now))
+    results_.emplace_back(slot, std::move(now));
 }
 
 // New records of bodies produced at `step`, ascending by slot.

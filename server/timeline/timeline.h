@@ -20,15 +20,13 @@
 
 #include "common/body_set.h"
 #include "server/physics/stepper.h"
+#include "server/timeline/effects.h"
 #include "server/timeline/marks.h"
 #include "server/timeline/record.h"
 #include "server/timeline/spatial_index.h"
 #include "server/timeline/table.h"
 
 namespace soda::timeline {
-
-// A body by its position in Model::bodies(): ascending by id.
-using Slot = std::uint32_t;
 
 // Bodies that must be solved together at a step, as far as this world sees.
 struct Island {
@@ -100,6 +98,10 @@ class Timeline {
   Ref<NearSet> near_set(const BodySet& set) const;  // of bodies received
   const Ref<NearSet>& heard(std::size_t source, Step step) const { return at(step).heard[source]; }
 
+  // The next entry of the action log: changes what has been computed of its step and, of what lasts, of later ones. The
+  // step may be any from oldest() + 1 on; a body that it spawns must be in the model already.
+  void act(const LoggedAction& action);
+
   bool has_pending(Step step) const { return !at(step).pending.empty(); }
   std::span<const Slot> pending(Step step) const { return at(step).pending; }
   // Does step -> step + 1 for what is pending and what that affects, in two parts: `process` finds the islands and
@@ -156,7 +158,8 @@ class Timeline {
     Table<Island> islands;
     std::vector<Ref<NearSet>> heard;  // by source
     std::vector<Slot> pending, changed;
-    std::vector<Slot> departed;  // produced here, and not own any more; ascending
+    std::vector<Slot> departed;       // produced here, and not own any more; ascending
+    std::map<Slot, Ref<Record>> raw;  // results of bodies that something is done to, before it is
     std::size_t count = 0;
     std::uint64_t hash = 0;
   };
@@ -173,6 +176,7 @@ class Timeline {
   void affect_touched(Step step, const Record& foreign);
   static void set_departed(Entry& entry, Slot slot, bool departed);
   void take_away(Step step, Slot slot);
+  void drop(Step step, Slot slot);
   void add_around(Step step, Slot slot);
   void gather(Step step, std::size_t first_affected);
   void gather_all(Step step);
@@ -181,7 +185,10 @@ class Timeline {
   bool grown(Step step);
   void sort_out(Step step, bool all);
   void keep(Step step, std::uint32_t island, Ref<Island> members);
+  void do_actions(Step step, Slot slot);
+  Ref<Record> after_actions(Step step, Slot slot, const Record* raw) const;
   void take_result(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts);
+  void take_acted(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts);
   void store(Step step, std::vector<Table<Record>::Item>& items);
 
   const physics::Model& model_;
@@ -194,6 +201,7 @@ class Timeline {
   std::deque<Entry> entries_;
   Step base_ = 0;
   std::vector<std::map<Step, Ref<NearSet>>> told_;  // by source
+  Effects effects_;
   TimelineStats stats_;
 
   // The round at hand.

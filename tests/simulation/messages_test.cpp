@@ -173,7 +173,7 @@ TEST(Link, DeliversInOrderAndRepeatsWhatWasLost) {
   border::Link out(1, 0, 1, 1), in(1, 1, 1, 0);
   const physics::Model model(hard_scene("corner").make());
   std::vector<std::vector<std::byte>> sent;
-  for (Step t = 0; t < 5; ++t) out.send(t, t - 1, t - 2, sent);
+  for (Step t = 0; t < 5; ++t) out.send(t, t - 1, t - 2, 0, sent);
   std::vector<Step> got;
   const auto deliver = [&](Message& m) { got.push_back(m.header.upto); };
   const auto give = [&](border::Link& to, const std::vector<std::byte>& bytes) {

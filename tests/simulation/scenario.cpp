@@ -6,6 +6,7 @@
 
 #include "common/scene/scene_builder.h"
 #include "tests/simulation/scenes.h"
+#include "tests/support/random_actions.h"
 
 namespace soda::test {
 
@@ -32,6 +33,7 @@ NetworkSettings network_of(std::uint64_t seed) {
   n.stall_share = std::vector<double>{0, 0.5, 0.9}[random() % 3];
   n.sync = random() % 4 == 0 ? border::Sync::kConservative : border::Sync::kAnticipative;
   n.window = std::vector<Step>{48, 12, 3}[random() % 3];
+  n.lead = std::vector<Step>{1, 4, 20, 200}[random() % 4];
   n.touch_share = std::vector<double>{0, 0.004}[random() % 2];
   return n;
 }
@@ -76,6 +78,9 @@ Scenario scenario_of(std::uint64_t seed) {
     default:
       s.owner = slabs(scene, s.worlds);
   }
+  // A third without any; half of the others as they come, half as a file has them.
+  if (const auto kind = random() % 6; kind >= 2)
+    s.actions = random_actions(scene, s.steps, 1 + random() % 12, kind >= 4, seed);
   return s;
 }
 
@@ -85,16 +90,20 @@ std::string Scenario::text() const {
          (network.sync == border::Sync::kConservative ? "conservative" : "K " + std::to_string(network.window)) +
          ", delay " + std::to_string(network.delay) + ", slow " + share(network.slow_share) + ", doubled " +
          share(network.double_share) + ", lost " + share(network.loss_share) + ", stalled " +
-         share(network.stall_share) + ", touched " + share(network.touch_share);
+         share(network.stall_share) + ", touched " + share(network.touch_share) + ", lead " +
+         std::to_string(network.lead) + ", " + std::to_string(actions.size()) + " actions";
 }
 
 SessionResult run_scenario(const Scenario& s) {
   const Reference& expected = reference(s.scene);
-  SessionResult got = run_session(expected.scene, s.worlds, s.steps, s.network, s.owner);
+  SessionResult got = run_session(expected.scene, s.worlds, s.steps, s.network, s.owner, s.actions);
   if (!got.failure.empty()) return got;
   const auto end = expected.steps.begin() + s.steps + 1;
-  got.failure = first_difference({expected.steps.begin(), end}, got.steps);
-  if (got.failure.empty() && got.total.refused > 0) got.failure = std::to_string(got.total.refused) + " messages refused";
+  got.failure = first_difference(s.actions.empty() ? std::vector<StepDigest>(expected.steps.begin(), end)
+                                                   : run_single(expected.scene, s.steps, s.actions),
+                                 got.steps);
+  if (got.failure.empty() && got.total.refused > 0)
+    got.failure = std::to_string(got.total.refused) + " messages refused";
   return got;
 }
 

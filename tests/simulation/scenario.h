@@ -30,6 +30,7 @@ struct Scenario {
   Step steps = 0;
   std::vector<WorldId> owner;  // territories; empty: those that a session would have
   NetworkSettings network;
+  Actions actions;
   std::string text() const;  // for people
 };
 Scenario scenario_of(std::uint64_t seed);

@@ -1,7 +1,7 @@
 // Runs simulated sessions by the number: each seed is a scene, worlds, territories and a network, and must give the
 // bits of one world. A seed that fails is printed with the command that repeats exactly that run.
-#include <algorithm>
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -80,6 +80,8 @@ int main(int argc, char** argv) {
       {"steps anticipated", s.anticipated},
       {"rollbacks", s.timeline.steps_redone},
       {"results of bodies done again", s.timeline.bodies_redone},
+      {"actions, summed over worlds", s.actions},
+      {"messages that came before an action", s.held_back},
       {"islands mixed", s.mixed_islands},
       {"bodies that changed worlds", s.arrived},
       {"wide bodies told", s.wide_bodies},

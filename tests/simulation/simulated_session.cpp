@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <deque>
+#include <limits>
 #include <memory>
 #include <queue>
 #include <random>
@@ -9,6 +11,7 @@
 #include "common/state_hash.h"
 #include "server/physics/model.h"
 #include "server/physics/stepper.h"
+#include "server/timeline/effects.h"
 
 namespace soda::test {
 namespace {
@@ -30,19 +33,98 @@ struct Flight {
   bool operator<(const Flight& o) const { return at != o.at ? at > o.at : number > o.number; }  // earliest on top
 };
 
+// World 0's session service: tells every world of actions, in order, and of how far they are closed, in no order with
+// those.
+class Service {
+ public:
+  Service(const Actions& log, const NetworkSettings& network, WorldId worlds)
+      : log_(log), network_(network), random_(network.seed + 77), inboxes_(worlds) {
+    const auto earlier = [](const LoggedAction& l, const LoggedAction& r) { return l.step < r.step; };
+    live_ = std::is_sorted(log.begin(), log.end(), earlier);
+  }
+
+  // Whether anything was done.
+  bool tick(std::uint64_t now, const std::vector<std::unique_ptr<border::WorldCore>>& cores) {
+    bool moved = false;
+    Step slowest = cores.front()->final_step();
+    for (const auto& core : cores) slowest = std::min(slowest, core->final_step());
+    if (slowest + network_.lead > closed_ && random_() % 4 == 0) {
+      const Step closed = slowest + network_.lead;
+      const Step ahead = live_ ? closed + static_cast<Step>(random_() % 8) : std::numeric_limits<Step>::max();
+      while (logged_ < log_.size() && log_[logged_].step <= ahead) {
+        for (Inbox& inbox : inboxes_) {
+          inbox.last = std::max(inbox.last, now + delay());
+          inbox.actions.emplace_back(inbox.last, logged_);
+        }
+        ++logged_;
+      }
+      closed_ = closed;
+      for (Inbox& inbox : inboxes_) inbox.closings.push_back({now + delay(), closed, logged_});
+      moved = true;
+    }
+    for (std::size_t w = 0; w < cores.size(); ++w) {
+      Inbox& inbox = inboxes_[w];
+      for (; !inbox.actions.empty() && inbox.actions.front().first <= now; inbox.actions.pop_front()) {
+        cores[w]->act(log_[inbox.actions.front().second]);
+        cores[w]->act(log_[inbox.actions.front().second]);  // told again: nothing
+        moved = true;
+      }
+      moved = std::erase_if(inbox.closings,
+                            [&](const Closing& closing) {
+                              if (closing.at > now) return false;
+                              cores[w]->close_actions(closing.step, closing.logged);
+                              return true;
+                            }) > 0 ||
+              moved || !inbox.actions.empty() || !inbox.closings.empty();
+    }
+    return moved;
+  }
+
+ private:
+  struct Closing {
+    std::uint64_t at;
+    Step step;
+    ActionNumber logged;
+  };
+  struct Inbox {
+    std::deque<std::pair<std::uint64_t, std::size_t>> actions;  // when they arrive, position in the log
+    std::uint64_t last = 0;
+    std::vector<Closing> closings;
+  };
+  std::uint64_t delay() { return 1 + random_() % static_cast<std::uint64_t>(2 * network_.delay + 1); }
+
+  const Actions& log_;
+  const NetworkSettings network_;
+  std::mt19937_64 random_;
+  std::vector<Inbox> inboxes_;
+  bool live_ = true;
+  Step closed_ = 0;
+  std::size_t logged_ = 0;
+};
+
 class Session {
  public:
   Session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
-          const std::vector<WorldId>& owner)
-      : model_(scene), network_(network), random_(network.seed), digests_(worlds), slowness_(worlds) {
+          const std::vector<WorldId>& owner, const Actions& log)
+      : scene_(scene),
+        network_(network),
+        random_(network.seed),
+        digests_(worlds),
+        slowness_(worlds),
+        service_(log, network, worlds) {
     const Grid grid = make_grid(scene);
     map_ = owner.empty() ? bisect(scene, grid, worlds) : TerritoryMap{grid, worlds, owner};
     for (WorldId w = 0; w < worlds; ++w) {
-      cores_.push_back(std::make_unique<border::WorldCore>(
-          model_, map_,
-          border::CoreSettings{
-              .me = w, .epoch = 1, .session = 42, .last_step = steps, .sync = network.sync, .window = network.window},
-          digests_[w]));
+      models_.push_back(std::make_unique<physics::Model>(scene));
+      cores_.push_back(std::make_unique<border::WorldCore>(*models_[w], map_,
+                                                           border::CoreSettings{.me = w,
+                                                                                .epoch = 1,
+                                                                                .session = 42,
+                                                                                .last_step = steps,
+                                                                                .sync = network.sync,
+                                                                                .window = network.window,
+                                                                                .actions = true},
+                                                           digests_[w]));
       slowness_[w] = uniform() * network.stall_share;
     }
     for (const auto& core : cores_) result_.least_neighbours += core->neighbours().size();
@@ -54,7 +136,7 @@ class Session {
     // Without any delivery or work for this long a world asks again, as a daemon does after a while.
     const std::uint64_t patience = 40ull * static_cast<std::uint64_t>(network_.delay + 1);
     for (std::uint64_t now = 0;; ++now) {
-      bool moved = false;
+      bool moved = service_.tick(now, cores_);
       for (; !flights_.empty() && flights_.top().at <= now; flights_.pop()) {
         const Flight& f = flights_.top();
         if (!cores_[f.to]->receive(*f.bytes)) return fail("refused: " + cores_[f.to]->last_refusal());
@@ -107,7 +189,7 @@ class Session {
     for (Step t = first; t <= newest; ++t) before.push_back(core.digest(t));
     std::vector<BodyId> bodies;
     const double share = uniform() * uniform();
-    for (const Body& body : model_.scene().bodies)
+    for (const Body& body : scene_.bodies)
       if (uniform() < share) bodies.push_back(body.id);
     core.touch(step, bodies);
     while (core.work() == border::Progress::kWorked) {
@@ -158,13 +240,15 @@ class Session {
     return result_;
   }
 
-  physics::Model model_;
+  const Scene& scene_;
   NetworkSettings network_;
   TerritoryMap map_;
   std::mt19937_64 random_;
   std::vector<Digests> digests_;
+  std::vector<std::unique_ptr<physics::Model>> models_;
   std::vector<std::unique_ptr<border::WorldCore>> cores_;
   std::vector<double> slowness_;
+  Service service_;
   std::priority_queue<Flight> flights_;
   std::uint64_t number_ = 0, stuck_ = 0;
   SessionResult result_;
@@ -188,18 +272,55 @@ void add(border::CoreStats& sum, const border::CoreStats& s) {
   sum.duplicates += s.duplicates;
   sum.refused += s.refused;
   sum.anticipated += s.anticipated;
+  sum.actions += s.actions;
+  sum.held_back += s.held_back;
   sum.timeline.bodies_computed += s.timeline.bodies_computed;
   sum.timeline.bodies_redone += s.timeline.bodies_redone;
   sum.timeline.steps_redone += s.timeline.steps_redone;
   sum.timeline.longest_rollback = std::max(sum.timeline.longest_rollback, s.timeline.longest_rollback);
 }
 
-std::vector<StepDigest> run_single(const Scene& scene, Step steps) {
-  const physics::Model model(scene);
+namespace {
+
+// What is done at a step, to all bodies at once.
+void do_actions(const timeline::Effects& effects, const physics::Model& model, Step step, BodySet& set) {
+  for (const timeline::Slot slot : effects.acted_on(step)) {
+    const BodyId id = model.bodies()[slot].id;
+    auto body = std::lower_bound(set.bodies.begin(), set.bodies.end(), id,
+                                 [](const BodyState& b, BodyId i) { return b.id < i; });
+    const bool there = body != set.bodies.end() && body->id == id;
+    std::optional<BodyState> given;
+    if (effects.gives(step, slot, given)) {
+      std::erase_if(set.contacts, [&](const ContactRecord& c) { return c.a == id; });
+      if (there && !given) {
+        set.bodies.erase(body);
+        continue;
+      }
+      if (!given) continue;
+      if (there)
+        *body = *given;
+      else
+        body = set.bodies.insert(body, *given);
+    } else if (!there) {
+      continue;
+    }
+    effects.apply(step, slot, *body);
+  }
+}
+
+}  // namespace
+
+std::vector<StepDigest> run_single(const Scene& scene, Step steps, const Actions& log) {
+  physics::Model model(scene);
+  for (const LoggedAction& action : log)
+    if (const auto* spawn = std::get_if<Spawn>(&action.action)) model.add(spawn->body);
+  timeline::Effects effects(model);
+  for (const LoggedAction& action : log) (void)effects.add(action);
   physics::Stepper stepper(model);
   BodySet set = model.initial_state();
   std::vector<StepDigest> digests;
   for (Step t = 0;; ++t) {
+    do_actions(effects, model, t, set);
     digests.push_back({set.bodies.size(), bodies_hash(set.bodies)});
     if (t == steps) return digests;
     stepper.step(set);
@@ -207,8 +328,8 @@ std::vector<StepDigest> run_single(const Scene& scene, Step steps) {
 }
 
 SessionResult run_session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
-                          const std::vector<WorldId>& owner) {
-  return Session(scene, worlds, steps, network, owner).run();
+                          const std::vector<WorldId>& owner, const Actions& log) {
+  return Session(scene, worlds, steps, network, owner, log).run();
 }
 
 std::string first_difference(const std::vector<StepDigest>& expected, const std::vector<StepDigest>& got) {

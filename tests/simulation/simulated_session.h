@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/actions/action.h"
 #include "common/scene/scene.h"
 #include "server/border/world_core.h"
 
@@ -27,6 +28,7 @@ struct NetworkSettings {
   double double_share = 0.05;  // of messages that arrive twice
   double loss_share = 0;       // of messages that never arrive; the sender is told nothing
   double stall_share = 0.5;    // of ticks in which a world does nothing
+  Step lead = 4;               // steps beyond the slowest final one up to which the session closes actions
   double touch_share = 0;      // of ticks in which a world at rest repairs a random step where nothing has changed
 };
 
@@ -41,12 +43,15 @@ struct SessionResult {
 // Adds what may be added up; of the longest, the longer.
 void add(border::CoreStats& sum, const border::CoreStats& s);
 
-// The reference: the step alone, again and again.
-std::vector<StepDigest> run_single(const Scene& scene, Step steps);
+using Actions = std::vector<LoggedAction>;
 
-// The session on `worlds` worlds. `owner` overrides the territories (by Grid::index) where not empty.
+// The reference: the step alone, again and again, and what is done to bodies in between.
+std::vector<StepDigest> run_single(const Scene& scene, Step steps, const Actions& log = {});
+
+// The session on `worlds` worlds. `owner` overrides the territories (by Grid::index) where not empty. Actions come
+// while it runs where their log is in the order of their steps, else all at the start.
 SessionResult run_session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
-                          const std::vector<WorldId>& owner = {});
+                          const std::vector<WorldId>& owner = {}, const Actions& log = {});
 
 // "step 17: ..." for the first step that differs, empty where none does.
 std::string first_difference(const std::vector<StepDigest>& expected, const std::vector<StepDigest>& got);

@@ -86,6 +86,8 @@ TEST(SpatialIndex, KeepsBothPlacesOfABodyThatTwoTellOf) {
     return std::count(found.begin(), found.end(), 3u) > 0;
   };
   SpatialIndex index(1);
+  for (Slot other = 10; other < 60; ++other)
+    index.note(other, Vec3(0, 0, 3.0 * other), false, 5);  // else all is looked at
   index.note(3, there, false, 5);
   index.note_beside(3, here, false, 5);  // asleep there, and so not noted again
   EXPECT_TRUE(index.is_beside(3));
