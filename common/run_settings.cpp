@@ -39,12 +39,11 @@ SyncMode parse_sync(const std::string& name) {
 }
 
 double parse_pace(const std::string& text) {
-  constexpr double kMost = 1e6;
   if (text == "realtime") return 1;
   if (text == "max") return 0;
   const char* what = "a pace is 'realtime', 'max' or a multiple of real time above 0";
   const double rate = number<double>(text, text, what);
-  if (!(rate > 0) || rate > kMost) throw std::invalid_argument(std::string(what) + ", not '" + text + "'");
+  if (!(rate > 0) || rate > kLargestPace) throw std::invalid_argument(std::string(what) + ", not '" + text + "'");
   return rate;
 }
 

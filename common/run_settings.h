@@ -13,6 +13,9 @@ namespace soda {
 constexpr Step kDefaultSteps = 600;  // 10 s at 60 Hz
 constexpr Step kDefaultWindow = 48;  // K, as in the paper: steps beyond the final one that a world may compute
 constexpr Step kLargestWindow = 4096;
+constexpr Step kDefaultLead =
+    6;  // input lead: an action of now is for this many steps after the displayed one, and one
+constexpr Step kLargestLead = 4096;
 
 // How worlds keep in step; the numbers go over the network (Session.sync).
 enum class SyncMode : unsigned char {
@@ -23,6 +26,8 @@ enum class SyncMode : unsigned char {
 const std::vector<std::string>& sync_names();      // by number
 const std::string& sync_name(unsigned char mode);  // "unknown" beyond them
 SyncMode parse_sync(const std::string& name);
+
+constexpr double kLargestPace = 1e6;  // multiple of real time
 
 // "realtime": 1; "max": 0 (as fast as possible); else a multiple of real time.
 double parse_pace(const std::string& text);

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "client/cli/act_command.h"
 #include "client/cli/diff_command.h"
 #include "client/cli/run_command.h"
 #include "client/cli/scene_command.h"
@@ -20,6 +21,8 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   soda::cli::add_run_command(app, exit_code);
   soda::cli::add_watch_command(app, exit_code);
+  soda::cli::add_act_command(app, exit_code);
+  soda::cli::add_pace_commands(app, exit_code);
   soda::cli::add_diff_command(app, exit_code);
   soda::add_scene_command(app, exit_code);
   try {

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <numeric>
 #include <random>
@@ -18,6 +19,8 @@
 
 #include "client/cli/dds_source.h"
 #include "client/cli/session_run.h"
+#include "common/actions/action_log.h"
+#include "common/actions/action_proto.h"
 #include "common/dds/checks.h"
 #include "common/grid.h"
 #include "common/import/load.h"
@@ -38,6 +41,8 @@ struct RunOptions {
   std::string pace = "realtime";
   std::string sync = "anticipative";
   Step window = kDefaultWindow;
+  Step lead = kDefaultLead;
+  std::string actions;  // file
   std::string dump_steps;
   std::string start;  // worlds to start here; "": all
   dds::NetworkOptions network;
@@ -135,6 +140,18 @@ std::vector<WorldId> checked(RunOptions& o) {
   return start;
 }
 
+// What world 0 would refuse is refused before anything is started. Throws ActionError.
+void check_actions(const std::string& file, const Scene& scene) {
+  ActionLog log(scene);
+  std::size_t number = 0;
+  for (WantedAction& wanted : load_actions(file, scene)) {
+    const auto result = log.add(std::move(wanted), 1);
+    ++number;
+    if (const auto* refused = std::get_if<ActionLog::Refused>(&result))
+      throw ActionError(file + ": action " + std::to_string(number) + ": " + refused->reason);
+  }
+}
+
 std::vector<std::string> arguments(const RunOptions& o, WorldId world) {
   std::vector<std::string> args{"--supervised-by", std::to_string(getpid()), "--world", std::to_string(world)};
   const auto add = [&](const std::vector<std::string>& more) { args.insert(args.end(), more.begin(), more.end()); };
@@ -145,7 +162,9 @@ std::vector<std::string> arguments(const RunOptions& o, WorldId world) {
   if (o.follow.verbose) add({"--verbose"});
   if (world != 0) return args;
   add({"--scene-fd", std::to_string(kSceneFd), "--worlds", std::to_string(o.worlds), "--steps", std::to_string(o.steps),
-       "--pace", o.pace, "--sync", o.sync, "--anticipation", std::to_string(o.window)});
+       "--pace", o.pace, "--sync", o.sync, "--anticipation", std::to_string(o.window), "--input-lead",
+       std::to_string(o.lead)});
+  if (!o.actions.empty()) add({"--actions", std::filesystem::absolute(o.actions).string()});
   if (o.single()) add({"--report-fd", std::to_string(kReportFd)});
   if (!o.dump_steps.empty()) add({"--dump-steps", o.dump_steps});
   return args;
@@ -162,6 +181,7 @@ int run(RunOptions& options) {
     const Scene scene = load(options);
     signals.on_stop(nullptr);
     (void)bisect(scene, make_grid(scene), options.worlds);  // says so now if there are more worlds than cells
+    if (!options.actions.empty()) check_actions(options.actions, scene);
     scene_fd = in_memory(encode_scene(scene));
   }
   Collector collector(options.follow.files);
@@ -217,6 +237,13 @@ void add_run_command(CLI::App& app, int& exit_code) {
   command->add_option("--anticipation", o->window, "K: steps beyond the final one that a world may compute")
       ->check(CLI::Range(Step{1}, kLargestWindow))
       ->capture_default_str();
+  command->add_option("--actions", o->actions, "file of what is done to bodies, and when (docs/actions.md)")
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("--input-lead", o->lead,
+                   "steps after the displayed one that are closed for actions: an action of now comes after them")
+      ->check(CLI::Range(Step{1}, kLargestLead))
+      ->capture_default_str();
   command->add_option("--hash-log", o->follow.files.hash_log,
                       "write 'STEP BODIES HASH' for each final step to this file");
   command->add_option("--stats", o->follow.stats, "write statistics to this file (JSON)");
@@ -231,6 +258,9 @@ void add_run_command(CLI::App& app, int& exit_code) {
       o->worlds_given = command->count("--worlds") > 0;
       exit_code = run(*o);
     } catch (const SceneError& e) {
+      std::fprintf(stderr, "error: %s\n", e.what());
+      exit_code = kExitBadInput;
+    } catch (const ActionError& e) {
       std::fprintf(stderr, "error: %s\n", e.what());
       exit_code = kExitBadInput;
     } catch (const std::invalid_argument& e) {

@@ -68,6 +68,8 @@ void add_counters(Object& object, const wire::Status& s) {
   object.add("refused", s.refused());
   object.add("clamped", s.clamped());
   object.add("non_finite", s.non_finite());
+  object.add("actions", s.logged());
+  object.add("held_back", s.held_back());
   object.add("anticipated", s.anticipated());
   object.add("bodies_computed", s.bodies_computed());
   object.add("bodies_redone", s.bodies_redone());
@@ -91,6 +93,7 @@ wire::Status sum_of(const std::vector<wire::Status>& worlds) {
     sum.parts_sent() += s.parts_sent(), sum.messages_resent() += s.messages_resent();
     sum.duplicates() += s.duplicates(), sum.refused() += s.refused(), sum.clamped() += s.clamped();
     sum.non_finite() += s.non_finite(), sum.interruptions() += s.interruptions();
+    sum.logged() = std::max(sum.logged(), s.logged()), sum.held_back() += s.held_back();
     sum.anticipated() += s.anticipated(), sum.bodies_computed() += s.bodies_computed();
     sum.bodies_redone() += s.bodies_redone(), sum.rollbacks() += s.rollbacks();
     sum.longest_rollback() = std::max(sum.longest_rollback(), s.longest_rollback());

@@ -53,11 +53,24 @@ template bool lengths_fit<wire::Session>(Cdr&);
 template bool lengths_fit<wire::Join>(Cdr&);
 template bool lengths_fit<wire::Admission>(Cdr&);
 template bool lengths_fit<wire::Control>(Cdr&);
+template bool lengths_fit<wire::Answer>(Cdr&);
 template bool lengths_fit<wire::Status>(Cdr&);
 
 template <>
 bool lengths_fit<wire::SceneChunk>(Cdr& cdr) {
   skip<std::uint64_t, std::uint32_t, std::uint32_t>(cdr);
+  return pass_sequence<std::uint8_t>(cdr);
+}
+
+template <>
+bool lengths_fit<wire::Request>(Cdr& cdr) {
+  skip<std::uint64_t, std::uint64_t, std::uint64_t, std::uint8_t, double>(cdr);
+  return pass_sequence<std::uint8_t>(cdr);
+}
+
+template <>
+bool lengths_fit<wire::LogEntry>(Cdr& cdr) {
+  skip<std::uint64_t, std::uint64_t>(cdr);
   return pass_sequence<std::uint8_t>(cdr);
 }
 
@@ -96,6 +109,7 @@ std::string problem(const wire::Session& s) {
   if (!ok_step(s.last_step())) return "impossible last step";
   if (s.sync() > wire::SYNC_ANTICIPATIVE) return "unknown sync mode";
   if (s.window() == 0 || s.window() > kLargestWindow) return "impossible window";
+  if (s.lead() == 0 || s.lead() > kLargestLead) return "impossible input lead";
   if (!std::isfinite(s.dt()) || s.dt() <= 0) return "impossible dt";
   if (!ok_seconds(s.pace())) return "impossible pace";
   if (s.dump_first() < -1 || s.dump_last() < s.dump_first() || s.dump_last() > kMaxStepNumber)
@@ -120,8 +134,26 @@ std::string problem(const wire::Admission& s) { return ok_text(s.reason()) ? "" 
 
 std::string problem(const wire::Control& s) {
   if (s.phase() > wire::PHASE_FAILED) return "unknown phase";
-  if (!ok_step(s.displayed()) || s.limit() < 0) return "impossible step";
+  if (!ok_step(s.displayed()) || s.limit() < 0 || s.closed() < 0) return "impossible step";
+  return ok_seconds(s.pace()) ? "" : "impossible pace";
+}
+
+std::string problem(const wire::Request& s) {
+  if (s.client() == 0) return "no client";
+  if (s.kind() > wire::REQUEST_SPEED) return "unknown kind";
+  if (!ok_seconds(s.value()) || s.value() > kLargestPace) return "impossible value";
+  if (s.action().size() > kMaxActionBytes) return "too long";
   return "";
+}
+
+std::string problem(const wire::Answer& s) {
+  if (!ok_text(s.reason())) return "overlong text";
+  return ok_step(s.step()) ? "" : "impossible step";
+}
+
+std::string problem(const wire::LogEntry& s) {
+  if (s.number() == 0) return "no number";
+  return s.action().size() <= kMaxActionBytes ? "" : "too long";
 }
 
 std::string problem(const wire::Border& s) {

@@ -21,6 +21,7 @@ constexpr std::size_t kMaxBorderBytes = 256 * 1024 * 1024;      // of one border
 constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 32;
 constexpr std::size_t kMaxDigests = 65536;  // steps in one sample
 constexpr std::size_t kMaxText = 1024;      // bytes of any string
+constexpr std::size_t kMaxActionBytes = 4 * 1024 * 1024;
 
 // Whether the lengths of the sample's sequences fit into what follows them. Run before the sample is taken apart,
 // because Fast CDR allocates what a length says before it looks for the elements. True for types without sequences.
@@ -34,6 +35,9 @@ std::string problem(const wire::Join& s);
 std::string problem(const wire::Admission& s);
 std::string problem(const wire::Control& s);
 std::string problem(const wire::Border& s);
+std::string problem(const wire::Request& s);
+std::string problem(const wire::Answer& s);
+std::string problem(const wire::LogEntry& s);
 std::string problem(const wire::Status& s);
 std::string problem(const wire::Digests& s);
 std::string problem(const wire::StateChunk& s);

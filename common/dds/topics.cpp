@@ -37,6 +37,14 @@ Topic admission_topic() { return {"soda/admission", newest(kManyWorlds)}; }
 
 Topic control_topic() { return {"soda/control", newest(1)}; }
 
+// A client's requests wait for a world 0 that is not there yet.
+Topic request_topic() { return {"soda/request", all(1024, Millis(1000))}; }
+
+Topic answer_topic() { return {"soda/answer", all(1024, Millis(100))}; }
+
+// The newest; who lacks older ones says so in its Status, and is told again.
+Topic action_log_topic() { return {"soda/action_log", all(4096, Millis(1000))}; }
+
 Topic status_topic() { return {"soda/status", newest(kManyWorlds)}; }
 
 // Two minutes of history at 20 samples a second for those who come late; afterwards the oldest acknowledged go.

@@ -31,6 +31,9 @@ Topic scene_topic();                           // SceneChunk
 Topic join_topic();                            // Join
 Topic admission_topic();                       // Admission
 Topic control_topic();                         // Control
+Topic request_topic();                         // Request
+Topic answer_topic();                          // Answer
+Topic action_log_topic();                      // LogEntry
 Topic status_topic();                          // Status
 Topic digests_topic();                         // Digests
 Topic states_topic();                          // StateChunk

@@ -1,11 +1,17 @@
-// Marks by slot that are all taken away at once.
+// Sets of slots: sorted, and as marks that are all taken away at once.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
 namespace soda::timeline {
+
+inline void sort_unique(std::vector<std::uint32_t>& slots) {
+  if (!std::is_sorted(slots.begin(), slots.end())) std::sort(slots.begin(), slots.end());
+  slots.erase(std::unique(slots.begin(), slots.end()), slots.end());
+}
 
 class Marks {
  public:

@@ -36,6 +36,15 @@ void release(Record* record);
 Ref<Record> make_record(const BodyState& body, std::span<const ContactRecord> contacts, const Place& place,
                         Step computed);
 
+// The records of body `id`, which `rest` begins with; `rest` goes on behind them.
+inline std::span<const ContactRecord> take_contacts(std::span<const ContactRecord>& rest, BodyId id) {
+  std::size_t n = 0;
+  while (n < rest.size() && rest[n].a == id) ++n;
+  const auto taken = rest.first(n);
+  rest = rest.subspan(n);
+  return taken;
+}
+
 // Bit for bit, contact records included.
 bool same(const Record& record, const BodyState& body, std::span<const ContactRecord> contacts);
 inline bool same(const Record& l, const Record& r) { return &l == &r || same(l, r.body, r.contacts()); }

@@ -8,6 +8,7 @@
 #include <bit>
 #include <utility>
 
+#include "common/actions/action_proto.h"
 #include "common/grid.h"
 
 namespace soda::world {
@@ -51,6 +52,7 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core.last_step = settings.last_step;
   core.sync = settings.sync;
   core.window = settings.window;
+  core.actions = true;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
   lines_.resize(core_->neighbours().size());
@@ -58,10 +60,47 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
 }
 
 void Daemon::set_limit(Step newest) {
-  Step known = limit_.load();
-  while (known < newest && !limit_.compare_exchange_weak(known, newest)) {
+  limit_.store(newest);
+  transport_.wake();
+}
+
+void Daemon::act(const wire::LogEntry& entry) {
+  LoggedAction action;
+  action.number = entry.number();
+  try {
+    const std::string_view bytes(reinterpret_cast<const char*>(entry.action().data()), entry.action().size());
+    WantedAction wanted = decode_action(bytes, model_.scene());
+    if (!wanted.step) throw ActionError("step: must be given");
+    action.step = *wanted.step;
+    action.action = std::move(wanted.action);
+  } catch (const ActionError& e) {
+    return spdlog::error("entry {} of the action log cannot be used: {}", entry.number(), e.what());
+  }
+  {
+    const std::lock_guard lock(actions_mutex_);
+    actions_.emplace(action.number, std::move(action));
+    actions_came_ = true;
   }
   transport_.wake();
+}
+
+void Daemon::close_actions(Step step, ActionNumber logged) {
+  {
+    const std::lock_guard lock(actions_mutex_);
+    closed_ = std::max(closed_, step);
+    closed_logged_ = std::max(closed_logged_, logged);
+    actions_came_ = true;
+  }
+  transport_.wake();
+}
+
+// Hands the core what is next in the log.
+void Daemon::act_all() {
+  const std::lock_guard lock(actions_mutex_);
+  if (!std::exchange(actions_came_, false)) return;
+  actions_.erase(actions_.begin(), actions_.upper_bound(core_->logged()));  // told again
+  while (!actions_.empty() && core_->act(actions_.begin()->second)) actions_.erase(actions_.begin());
+  core_->close_actions(closed_, closed_logged_);
 }
 
 void Daemon::release() {
@@ -154,6 +193,8 @@ wire::Status Daemon::status() const {
   s.refused(stats.refused);
   s.clamped(stats.clamped);
   s.non_finite(stats.non_finite);
+  s.logged(core_->logged());
+  s.held_back(stats.held_back);
   s.anticipated(stats.anticipated);
   s.bodies_computed(stats.timeline.bodies_computed);
   s.bodies_redone(stats.timeline.bodies_redone);
@@ -179,9 +220,10 @@ void Daemon::report_status(std::uint8_t state, Clock::time_point now) {
 
 void Daemon::report_if_due(Clock::time_point now) {
   recorder_.flush_if_due(now);
-  // A paced session lets nobody run ahead of the slowest that it has heard of, so news of progress must not be late.
-  const bool progress = limit_known_ < kNoLimit && now - status_at_ >= kStatusAtMost &&
-                        core_->final_step() >= status_final_ + settings_.window / 4;
+  // A session lets nobody run ahead of the slowest that it has heard of, by a little when it is paced and by some
+  // windows when it is not, so news of progress must not be late.
+  const Step due = limit_known_ < kNoLimit ? 1 : settings_.window;
+  const bool progress = now - status_at_ >= kStatusAtMost && core_->final_step() >= status_final_ + due;
   if (progress || now - status_at_ >= kStatusEvery) report_status(state_, now);
 }
 
@@ -201,6 +243,7 @@ Daemon::End Daemon::run() {
   while (!stopped_.load()) {
     const auto before = Clock::now();
     receive_all();
+    act_all();
     if (const Step limit = limit_.load(); limit != limit_known_) {
       limit_known_ = limit;
       core_->set_limit(limit);

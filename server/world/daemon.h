@@ -6,7 +6,9 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "common/scene/scene.h"
@@ -43,9 +45,12 @@ class Daemon {
   End run();
 
   // From any thread.
-  void set_limit(Step newest);  // the clock does not pass it; never lowered
-  void release();               // the session has ended: who is done may leave
-  void stop();                  // leave as soon as possible
+  void set_limit(Step newest);  // the clock does not go on beyond it
+  // An entry of the session's action log, in any order, any number of times; and how far actions are closed.
+  void act(const wire::LogEntry& entry);
+  void close_actions(Step step, ActionNumber logged);
+  void release();  // the session has ended: who is done may leave
+  void stop();     // leave as soon as possible
 
   // After run().
   const border::WorldCore& core() const { return *core_; }
@@ -65,6 +70,7 @@ class Daemon {
   void report_if_due(Clock::time_point now);
   void report_status(std::uint8_t state, Clock::time_point now);
   void idle(border::Progress progress);
+  void act_all();
   wire::Status status() const;
   Line& line(WorldId neighbour);
 
@@ -77,7 +83,12 @@ class Daemon {
   std::unique_ptr<border::WorldCore> core_;
   std::vector<Line> lines_;  // by position in core_->neighbours()
 
-  std::atomic<Step> limit_{-1};  // -1: not started
+  std::atomic<Step> limit_{-1};                   // -1: not started
+  std::mutex actions_mutex_;                      // guards what follows
+  std::map<ActionNumber, LoggedAction> actions_;  // that the core does not have yet
+  Step closed_ = 0;                               // by the newest Control
+  ActionNumber closed_logged_ = 0;
+  bool actions_came_ = false;
   std::atomic<bool> released_{false}, stopped_{false};
   Step limit_known_ = -1;  // by the core
 

@@ -49,6 +49,7 @@ void check(const Options& o) {
     throw std::invalid_argument("--scene: only world 0 has one; the others get it from there");
   if (o.sync == SyncMode::kSingle && (o.world != 0 || o.worlds != 1))
     throw std::invalid_argument("--sync single: there is only one world then");
+  if (o.world != 0 && !o.actions.empty()) throw std::invalid_argument("--actions: only world 0 has them");
   if (o.world == 0 && o.dump_last > o.steps) throw std::invalid_argument("--dump-steps: beyond the last step");
 }
 
@@ -89,6 +90,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       ->check(CLI::Range(Step{1}, kLargestWindow))
       ->capture_default_str()
       ->group(group);
+  app.add_option("--input-lead", o.lead, "steps beyond the displayed one that are closed for actions")
+      ->check(CLI::Range(Step{1}, kLargestLead))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--actions", o.actions, "file of actions (see docs/actions.md)")->group(group);
   app.add_option("--dump-steps", dump, "A[:B]: report the whole states of these steps")->group(group);
   dds::add_network_options(app, o.network);
   const char* hidden = "";

@@ -26,6 +26,8 @@ struct Options {
   Step steps = kDefaultSteps;
   double pace = 1;  // multiple of real time; 0: as fast as possible
   Step window = kDefaultWindow;
+  Step lead = kDefaultLead;
+  std::string actions;  // file
   Step dump_first = -1, dump_last = -1;
 
   // For those that start soda-world themselves.

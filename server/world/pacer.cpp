@@ -2,18 +2,34 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace soda::world {
 
 Pacer::Order Pacer::at(double now, Step slowest_final) {
-  if (rate_ == 0) return {slowest_final, kNoLimit};
-  if (started_) displayed_ += (now - then_) * rate_;
-  started_ = true;
+  const double passed = std::exchange(started_, true) ? now - then_ : 0;
   then_ = now;
-  // Time that the worlds could not keep up with is lost, not caught up later.
-  displayed_ = std::min(displayed_, static_cast<double>(std::min(slowest_final, last_)));
+  const auto slowest = static_cast<double>(std::min(slowest_final, last_));
+  const bool max = rate_ == 0 && !paused_;
+  if (paused_)
+    displayed_ = std::max(displayed_, std::min(static_cast<double>(goal_), slowest));
+  else if (max)
+    displayed_ = std::max(displayed_, slowest);
+  else  // time that the worlds could not keep up with is lost, not caught up later
+    displayed_ = std::min(displayed_ + passed * rate_, std::max(slowest, std::floor(displayed_)));
   const Step displayed = static_cast<Step>(std::floor(displayed_));
-  return {displayed, displayed + window_};
+  // As fast as possible, nobody is to wait for this.
+  closed_ = std::max(closed_, displayed + (max ? 4 * window_ : lead_));
+  return {displayed, max ? kNoLimit : displayed + window_, closed_};
 }
+
+void Pacer::pause() {
+  if (paused_) return;
+  paused_ = true;
+  displayed_ = std::floor(displayed_);
+  goal_ = static_cast<Step>(displayed_);
+}
+
+void Pacer::step(Step steps) { goal_ = std::min(goal_ + steps, last_); }
 
 }  // namespace soda::world

@@ -12,6 +12,7 @@
 #include <system_error>
 #include <thread>
 
+#include "common/actions/action_proto.h"
 #include "common/dds/participant.h"
 #include "common/scene/scene_file.h"
 #include "common/scene/validate.h"
@@ -84,6 +85,7 @@ wire::Session describe(const Options& options, const EncodedScene& scene) {
   s.sync(static_cast<std::uint8_t>(options.sync));
   s.window(static_cast<std::uint32_t>(options.window));
   s.dt(scene.scene.dt);
+  s.lead(static_cast<std::uint32_t>(options.lead));
   s.pace(options.pace);
   s.dump_first(options.dump_first);
   s.dump_last(options.dump_last);
@@ -109,8 +111,20 @@ void obey(Daemon& daemon, const wire::Control& control) {
     spdlog::error("the session has failed; leaving it");
     return daemon.stop();
   }
-  if (control.phase() != wire::PHASE_GATHERING) daemon.set_limit(control.limit());
+  if (control.phase() != wire::PHASE_GATHERING) {
+    daemon.close_actions(control.closed(), control.logged());
+    daemon.set_limit(control.limit());
+  }
   if (control.phase() == wire::PHASE_ENDED) daemon.release();
+}
+
+SessionListener listener_of(Daemon& daemon) {
+  return {[&daemon](const wire::Control& control) { obey(daemon, control); },
+          [&daemon](const wire::LogEntry& entry) { daemon.act(entry); }};
+}
+
+std::vector<WantedAction> actions_of(const Options& options, const Scene& scene) {
+  return options.actions.empty() ? std::vector<WantedAction>() : load_actions(options.actions, scene);
 }
 
 void print_summary(const Options& options, const Daemon& daemon, double wall) {
@@ -153,8 +167,11 @@ int run_single(const Options& options, StopSignals& signals) {
   });
   reports.session(session);
   NoTransport transport;
+  const auto shared = std::make_shared<const Scene>(scene.scene);
+  std::vector<WantedAction> actions = actions_of(options, *shared);
   Daemon daemon(std::move(scene.scene), settings_of(session, options), transport, reports);
-  SessionService service(session, [&](const wire::Control& control) { obey(daemon, control); });
+  const SessionListener listening = listener_of(daemon);
+  SessionService service(session, shared, std::move(actions), {listening.control, listening.entry, [](const auto&) {}});
   listener = &service;
   return run(daemon, options, signals);
 }
@@ -171,8 +188,10 @@ int run_host(const Options& options, StopSignals& signals) {
   DdsReports reports(participant, options.supervised_by != 0, session.dump_first() >= 0,
                      [&] { return signals.received() != 0; });
   DdsTransport transport(participant, options.world);
+  const auto shared = std::make_shared<const Scene>(scene.scene);
+  std::vector<WantedAction> actions = actions_of(options, *shared);
   Daemon daemon(std::move(scene.scene), settings_of(session, options), transport, reports);
-  SessionHost host(participant, session, scene.bytes, [&](const wire::Control& control) { obey(daemon, control); });
+  SessionHost host(participant, session, scene.bytes, shared, std::move(actions), listener_of(daemon));
   spdlog::info("session '{}': {} worlds, scene {} ({} kB), {} steps", options.session, session.worlds(),
                to_hex(session.scene_hash()), session.scene_bytes() / 1000, session.last_step());
   std::atomic<bool> over{false};
@@ -261,9 +280,9 @@ int run_guest(const Options& options, StopSignals& signals) {
   // The guest outlives the daemon, and must not talk to it then, whatever happens.
   struct Listening {
     SessionGuest& guest;
-    ~Listening() { guest.listen(nullptr); }
+    ~Listening() { guest.stop_listening(); }
   } const listening{guest};
-  guest.listen([&](const wire::Control& control) { obey(daemon, control); });
+  guest.listen(listener_of(daemon));
   const HostWatch watch(guest, daemon);
   return run(daemon, options, signals);
 }
@@ -278,6 +297,9 @@ int run_world(const Options& options, StopSignals& signals) {
     spdlog::error("{}", e.what());
     return kExitRefused;
   } catch (const SceneError& e) {
+    spdlog::error("{}", e.what());
+    return kExitBadInput;
+  } catch (const ActionError& e) {
     spdlog::error("{}", e.what());
     return kExitBadInput;
   } catch (const std::invalid_argument& e) {

@@ -17,7 +17,7 @@ constexpr std::chrono::seconds kLogEvery{5};
 }  // namespace
 
 SessionGuest::SessionGuest(dds::Participant& participant, const std::string& session, const wire::Join& claim)
-    : name_(session), claim_(claim) {
+    : name_(session), claim_(claim), participant_(participant) {
   session_ = std::make_unique<dds::Reader<wire::Session>>(
       participant, dds::session_topic(),
       [this](wire::Session&& sample, const dds::WriterKey&) {
@@ -58,7 +58,7 @@ SessionGuest::SessionGuest(dds::Participant& participant, const std::string& ses
                                                               offer(sample.instance()).control = sample;
                                                               mine = sample.instance() == instance_;
                                                             }
-                                                            if (mine && on_control_) on_control_(sample);
+                                                            if (mine && listener_.control) listener_.control(sample);
                                                           });
   join_ = std::make_unique<dds::Writer<wire::Join>>(participant, dds::join_topic());
   join_->write(claim_);
@@ -143,15 +143,29 @@ std::optional<SessionGuest::Admitted> SessionGuest::join(const std::function<boo
   return std::nullopt;
 }
 
-void SessionGuest::listen(std::function<void(const wire::Control&)> on_control) {
-  const std::lock_guard tell_lock(tell_mutex_);
-  on_control_ = std::move(on_control);
-  std::optional<wire::Control> newest;
+void SessionGuest::listen(SessionListener listener) {
   {
-    const std::lock_guard lock(mutex_);
-    newest = offer(instance_).control;
+    const std::lock_guard tell_lock(tell_mutex_);
+    listener_ = std::move(listener);
+    std::optional<wire::Control> newest;
+    {
+      const std::lock_guard lock(mutex_);
+      newest = offer(instance_).control;
+    }
+    if (newest) listener_.control(*newest);
   }
-  if (newest && on_control_) on_control_(*newest);
+  log_ = std::make_unique<dds::Reader<wire::LogEntry>>(participant_, dds::action_log_topic(),
+                                                       [this](wire::LogEntry&& sample, const dds::WriterKey&) {
+                                                         const std::lock_guard tell_lock(tell_mutex_);
+                                                         if (sample.instance() == instance_ && listener_.entry)
+                                                           listener_.entry(sample);
+                                                       });
+}
+
+void SessionGuest::stop_listening() {
+  log_.reset();
+  const std::lock_guard tell_lock(tell_mutex_);
+  listener_ = {};
 }
 
 bool SessionGuest::host_gone() const {

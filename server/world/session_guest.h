@@ -14,6 +14,7 @@
 
 #include "common/dds/participant.h"
 #include "common/ids.h"
+#include "server/world/session_host.h"
 
 namespace soda::world {
 
@@ -36,9 +37,10 @@ class SessionGuest {
   // for. Nothing if `stop` said so. Throws Refused.
   std::optional<Admitted> join(const std::function<bool()>& stop);
 
-  // `on_control` hears the newest Control and all that follow, of the session that admitted this daemon. Null takes it
-  // back: it does not run any more when this returns.
-  void listen(std::function<void(const wire::Control&)> on_control);
+  // `listener` hears the newest Control and all that follow, and the action log, of the session that admitted this
+  // daemon.
+  void listen(SessionListener listener);
+  void stop_listening();  // the listener does not run any more when this returns
   // Whether world 0 is gone.
   bool host_gone() const;
 
@@ -59,8 +61,9 @@ class SessionGuest {
 
   const std::string name_;
   const wire::Join claim_;
-  std::mutex tell_mutex_;  // guards on_control_, also while it runs; taken before mutex_
-  std::function<void(const wire::Control&)> on_control_;
+  dds::Participant& participant_;
+  std::mutex tell_mutex_;  // guards listener_, also while it runs; taken before mutex_
+  SessionListener listener_;
   mutable std::mutex mutex_;  // guards the rest
   std::condition_variable changed_;
   std::map<std::uint64_t, Offer> offers_;  // by instance
@@ -71,6 +74,7 @@ class SessionGuest {
   std::unique_ptr<dds::Reader<wire::SceneChunk>> scene_;
   std::unique_ptr<dds::Reader<wire::Admission>> admission_;
   std::unique_ptr<dds::Reader<wire::Control>> control_;
+  std::unique_ptr<dds::Reader<wire::LogEntry>> log_;
   std::unique_ptr<dds::Writer<wire::Join>> join_;
 };
 

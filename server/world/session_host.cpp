@@ -30,18 +30,31 @@ void hand_out(dds::Writer<wire::SceneChunk>& writer, std::uint64_t instance, con
 }  // namespace
 
 SessionHost::SessionHost(dds::Participant& participant, const wire::Session& session, const std::string& encoded_scene,
-                         std::function<void(const wire::Control&)> on_control)
+                         std::shared_ptr<const Scene> decoded_scene, std::vector<WantedAction> actions,
+                         SessionListener listener)
     : session_(session),
-      on_control_(std::move(on_control)),
+      listener_(std::move(listener)),
       session_writer_(participant, dds::session_topic()),
       scene_writer_(participant, dds::scene_topic()),
       admission_writer_(participant, dds::admission_topic()),
-      control_writer_(participant, dds::control_topic()) {
+      control_writer_(participant, dds::control_topic()),
+      log_writer_(participant, dds::action_log_topic()),
+      answer_writer_(participant, dds::answer_topic()) {
   hand_out(scene_writer_, session.instance(), encoded_scene);
-  service_ = std::make_unique<SessionService>(session_, [this](const wire::Control& control) {
+  SessionService::Outlet outlet;
+  outlet.control = [this](const wire::Control& control) {
     if (!control_writer_.write(control)) spdlog::warn("cannot publish the session's control");
-    on_control_(control);
-  });
+    listener_.control(control);
+  };
+  outlet.entry = [this](const wire::LogEntry& entry) {
+    if (!log_writer_.write(entry)) spdlog::warn("cannot publish an action; it is told again to those who lack it");
+    listener_.entry(entry);
+  };
+  outlet.answer = [this](const wire::Answer& answer) {
+    if (!answer_writer_.write(answer)) spdlog::warn("cannot answer a request");
+  };
+  service_ =
+      std::make_unique<SessionService>(session_, std::move(decoded_scene), std::move(actions), std::move(outlet));
   session_reader_ = std::make_unique<dds::Reader<wire::Session>>(
       participant, dds::session_topic(),
       [this](wire::Session&& other, const dds::WriterKey& writer) { heard(other, writer); });
@@ -50,6 +63,9 @@ SessionHost::SessionHost(dds::Participant& participant, const wire::Session& ses
   status_reader_ = std::make_unique<dds::Reader<wire::Status>>(
       participant, dds::status_topic(),
       [this](wire::Status&& status, const dds::WriterKey&) { service_->status(status); });
+  request_reader_ = std::make_unique<dds::Reader<wire::Request>>(
+      participant, dds::request_topic(),
+      [this](wire::Request&& request, const dds::WriterKey&) { service_->request(request); });
   if (!session_writer_.write(session_)) throw std::runtime_error("cannot describe the session");
 }
 
@@ -57,6 +73,7 @@ SessionHost::~SessionHost() {
   session_reader_.reset();
   join_reader_.reset();
   status_reader_.reset();
+  request_reader_.reset();
   service_.reset();  // its thread uses the writers
 }
 

@@ -11,11 +11,13 @@
 namespace soda::world {
 namespace {
 
-constexpr std::chrono::milliseconds kTick{10};  // of a paced run: finer than a frame of any display
-constexpr double kLogEvery = 5;                 // s, while worlds are missing
-constexpr double kJoining = 60;                 // s that a daemon may take to load the scene and say so
-constexpr double kGone = 120;                   // s of silence after which a running world will not come back
-constexpr double kPause = 2;                    // s between two looks at the clock: this process stood still
+constexpr std::chrono::milliseconds kTick{5};  // of a paced run: finer than a frame of any display
+constexpr double kTellAgain = 0.5;             // s that a world may lack entries of the log that were told
+constexpr std::size_t kTellAtOnce = 256;       // of those, again
+constexpr double kLogEvery = 5;                // s, while worlds are missing
+constexpr double kJoining = 60;                // s that a daemon may take to load the scene and say so
+constexpr double kGone = 120;                  // s of silence after which a running world will not come back
+constexpr double kPause = 2;                   // s between two looks at the clock: this process stood still
 constexpr double kSilenceSeconds = std::chrono::duration<double>(dds::kSilence).count();
 
 double seconds_now() {
@@ -24,11 +26,13 @@ double seconds_now() {
 
 }  // namespace
 
-SessionService::SessionService(const wire::Session& session, std::function<void(const wire::Control&)> publish)
+SessionService::SessionService(const wire::Session& session, std::shared_ptr<const Scene> scene,
+                               std::vector<WantedAction> actions, Outlet outlet)
     : session_(session),
-      publish_(std::move(publish)),
+      outlet_(std::move(outlet)),
       seats_(session.worlds()),
-      pacer_(session.pace() / session.dt(), session.window(), session.last_step()),
+      pacer_(session.pace() / session.dt(), session.window(), session.lead(), session.last_step()),
+      desk_(session.instance(), std::move(scene), std::move(actions)),
       next_log_(seconds_now() + kLogEvery),
       looked_(seconds_now()) {
   seats_[0].nonce = session.instance();
@@ -85,9 +89,66 @@ void SessionService::status(const wire::Status& status) {
     seat.reported = true;
     seat.state = std::max(seat.state, status.state());
     seat.final_step = std::max<Step>(seat.final_step, status.final_step());
+    seat.logged = std::max(seat.logged, status.logged());
     news_ = true;
   }
   changed_.notify_one();
+}
+
+void SessionService::request(const wire::Request& request) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (request.instance() != 0 && request.instance() != session_.instance()) return;
+    std::optional<wire::Answer> answer;
+    if (!desk_.is_repeated(request, answer)) {
+      answer = answer_to(request);
+      desk_.note(*answer);
+    }
+    if (!answer) return;
+    answers_.push_back(*answer);
+    news_ = true;
+  }
+  changed_.notify_one();
+}
+
+wire::Answer SessionService::answer_to(const wire::Request& request) {
+  if (phase_ == wire::PHASE_ENDED || phase_ == wire::PHASE_FAILED)
+    return desk_.answer(request, "the session has ended", displayed_);
+  switch (request.kind()) {
+    case wire::REQUEST_ACTION:
+      if (closed_ >= session_.last_step())
+        return desk_.answer(request, "the session's last step is closed for actions", displayed_);
+      return desk_.act(request, closed_ + 1);
+    case wire::REQUEST_PAUSE:
+      pacer_.pause();
+      break;
+    case wire::REQUEST_RESUME:
+      pacer_.resume();
+      break;
+    case wire::REQUEST_STEP:
+      if (!pacer_.paused()) return desk_.answer(request, "single steps are for a paused session", displayed_);
+      pacer_.step(static_cast<Step>(request.value()));
+      break;
+    default:
+      pacer_.set_rate(request.value() / session_.dt());
+  }
+  return desk_.answer(request, "", displayed_);
+}
+
+// What a world lacks of what was told some time ago.
+void SessionService::tell_again(double now) {
+  const auto& log = desk_.entries();
+  for (Seat& seat : seats_) {
+    if (seat.logged >= told_ || !seat.reported) {
+      seat.behind_since = now;
+    } else if (now - seat.behind_since > kTellAgain) {
+      seat.behind_since = now;
+      const std::size_t end = std::min(told_, seat.logged + kTellAtOnce);
+      entries_.insert(entries_.end(), log.begin() + static_cast<std::ptrdiff_t>(seat.logged),
+                      log.begin() + static_cast<std::ptrdiff_t>(end));
+    }
+  }
+  for (; told_ < log.size(); ++told_) entries_.push_back(log[told_]);
 }
 
 bool SessionService::gathering() const {
@@ -157,9 +218,16 @@ wire::Control SessionService::next(double now) {
     Step slowest = session_.last_step();
     for (const Seat& seat : seats_) slowest = std::min(slowest, seat.final_step);
     const Pacer::Order order = pacer_.at(now, slowest);
+    displayed_ = order.displayed;
+    closed_ = order.closed;
     control.displayed(order.displayed);
     control.limit(order.limit);
+    control.closed(order.closed);
   }
+  tell_again(now);
+  control.logged(told_);
+  control.pace(pacer_.rate() * session_.dt());
+  control.paused(pacer_.paused());
   return control;
 }
 
@@ -170,15 +238,19 @@ void SessionService::run() {
   while (!quit_) {
     news_ = false;
     const wire::Control control = next(seconds_now());
-    if (control.phase() != last.phase() || control.displayed() != last.displayed() || control.limit() != last.limit()) {
-      last = control;
+    if (!(control == last) || !entries_.empty() || !answers_.empty()) {
+      const auto entries = std::exchange(entries_, {});
+      const auto answers = std::exchange(answers_, {});
       lock.unlock();
-      publish_(control);
+      for (const wire::LogEntry& entry : entries) outlet_.entry(entry);
+      if (!(control == last)) outlet_.control(control);
+      for (const wire::Answer& answer : answers) outlet_.answer(answer);
+      last = control;
       std::this_thread::sleep_for(kTick / 2);  // however often worlds report
       lock.lock();
       if (quit_) break;
     }
-    const bool ticking = phase_ == wire::PHASE_RUNNING && session_.pace() > 0;
+    const bool ticking = phase_ == wire::PHASE_RUNNING && pacer_.rate() > 0 && !pacer_.paused();
     changed_.wait_for(lock, ticking ? kTick : std::chrono::milliseconds(500), [this] { return news_; });
   }
 }

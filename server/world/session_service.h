@@ -1,26 +1,36 @@
 // What world 0 does for the session besides being a world: it admits worlds, starts the run when all are ready, paces
-// it, and ends it when all are done. Knows no DDS: session_host.h brings it to the network; a run without network uses
-// it as it is. Not in the step path.
+// it, takes what users want to be done, and ends it when all are done. Knows no DDS: session_host.h brings it to the
+// network; a run without network uses it as it is. Not in the step path.
 #pragma once
 
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "common/scene/scene.h"
 #include "idl/soda.h"
+#include "server/world/action_desk.h"
 #include "server/world/pacer.h"
 
 namespace soda::world {
 
 class SessionService {
  public:
-  // `publish` is called from the service's own thread whenever anything changes, at most about 100 times a second.
-  // World 0 needs no Join.
-  SessionService(const wire::Session& session, std::function<void(const wire::Control&)> publish);
+  // How the service speaks: called from its own thread. Control whenever anything changes, at most about 200 times a
+  // second; entries of the log before the Control that counts them, some again for worlds that lack them.
+  struct Outlet {
+    std::function<void(const wire::Control&)> control;
+    std::function<void(const wire::LogEntry&)> entry;
+    std::function<void(const wire::Answer&)> answer;
+  };
+  // World 0 needs no Join. `actions` are in the log from the start. Throws ActionError where one of them is refused.
+  SessionService(const wire::Session& session, std::shared_ptr<const Scene> scene, std::vector<WantedAction> actions,
+                 Outlet outlet);
   ~SessionService();
   SessionService(const SessionService&) = delete;
   SessionService& operator=(const SessionService&) = delete;
@@ -30,6 +40,7 @@ class SessionService {
   // its place.
   std::string join(const wire::Join& claim);
   void status(const wire::Status& status);
+  void request(const wire::Request& request);
 
   bool ended() const;
   bool gathering() const;  // the run has not started
@@ -42,6 +53,8 @@ class SessionService {
     bool reported = false;    // there has been a Status
     std::uint8_t state = wire::STATE_PREPARING;
     Step final_step = 0;
+    std::uint64_t logged = 0;  // entries of the log that it has
+    double behind_since = 0;   // s, that it lacks some that were told
   };
 
   void run();
@@ -51,13 +64,20 @@ class SessionService {
   bool all(std::uint8_t state, double now) const;  // whether all seats are taken and have got that far
   void excuse_own_pause(double now);
   void look_for_the_gone(double now);
+  wire::Answer answer_to(const wire::Request& request);
+  void tell_again(double now);
 
   const wire::Session session_;
-  const std::function<void(const wire::Control&)> publish_;
+  const Outlet outlet_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Seat> seats_;
   Pacer pacer_;
+  ActionDesk desk_;
+  Step closed_ = 0, displayed_ = 0;
+  std::size_t told_ = 0;                 // entries of the log
+  std::vector<wire::LogEntry> entries_;  // to be told now
+  std::vector<wire::Answer> answers_;    // likewise
   std::uint8_t phase_ = wire::PHASE_GATHERING;
   double next_log_ = 0;
   double looked_ = 0;  // s, time of the last next()

@@ -16,6 +16,7 @@
 #include "server/world/daemon.h"
 #include "server/world/session_service.h"
 #include "tests/support/in_process_transport.h"
+#include "tests/support/random_actions.h"
 
 namespace soda::world {
 namespace {
@@ -71,13 +72,15 @@ struct RunResult {
   std::uint64_t interruptions = 0, resent = 0, mixed_islands = 0;
 };
 
-RunResult run(const Scene& scene, WorldId worlds, Step steps, double pace, double loss) {
+RunResult run(const Scene& scene, WorldId worlds, Step steps, double pace, double loss,
+              std::vector<WantedAction> actions = {}) {
   wire::Session session;
   session.protocol(kProtocolVersion);
   session.instance(1);
   session.worlds(worlds);
   session.last_step(steps);
   session.window(48);
+  session.lead(4);
   session.dt(scene.dt);
   session.pace(pace);
 
@@ -97,12 +100,21 @@ RunResult run(const Scene& scene, WorldId worlds, Step steps, double pace, doubl
     settings.last_step = steps;
     daemons.push_back(std::make_unique<Daemon>(scene, settings, *transports.back(), *reports.back()));
   }
-  service = std::make_unique<SessionService>(session, [&](const wire::Control& control) {
+  SessionService::Outlet outlet;
+  outlet.control = [&](const wire::Control& control) {
     for (const auto& daemon : daemons) {
-      if (control.phase() != wire::PHASE_GATHERING) daemon->set_limit(control.limit());
+      if (control.phase() != wire::PHASE_GATHERING) {
+        daemon->close_actions(control.closed(), control.logged());
+        daemon->set_limit(control.limit());
+      }
       if (control.phase() == wire::PHASE_ENDED) daemon->release();
     }
-  });
+  };
+  outlet.entry = [&](const wire::LogEntry& entry) {
+    for (const auto& daemon : daemons) daemon->act(entry);
+  };
+  outlet.answer = [](const wire::Answer&) {};
+  service = std::make_unique<SessionService>(session, std::make_shared<const Scene>(scene), std::move(actions), outlet);
   for (WorldId me = 1; me < worlds; ++me) {
     wire::Join claim;
     claim.protocol(kProtocolVersion);
@@ -136,6 +148,13 @@ std::map<Step, Ledger::Row> without_worlds(std::map<Step, Ledger::Row> rows) {
 
 constexpr Step kSteps = 150;
 
+std::vector<WantedAction> some_actions(const Scene& scene) {
+  std::vector<WantedAction> wanted;
+  for (LoggedAction& action : test::random_actions(scene, kSteps, 20, false, 3))
+    wanted.push_back({std::move(action.action), action.step, {}});
+  return wanted;
+}
+
 TEST(DaemonThreads, SeveralWorldsGiveTheBitsOfOne) {
   const Scene scene = generate("heap", 200, 1);
   const RunResult one = run(scene, 1, kSteps, 0, 0);
@@ -153,6 +172,17 @@ TEST(DaemonThreads, LossesChangeNothing) {
   EXPECT_EQ(without_worlds(lossy.rows), without_worlds(one.rows));
   EXPECT_GT(lossy.interruptions, 0u);
   EXPECT_GT(lossy.resent, 0u);
+}
+
+TEST(DaemonThreads, ActionsAreTheSameForAll) {
+  const Scene scene = generate("heap", 200, 1);
+  const RunResult quiet = run(scene, 1, kSteps, 0, 0);
+  const RunResult one = run(scene, 1, kSteps, 0, 0, some_actions(scene));
+  EXPECT_NE(one.rows, quiet.rows);
+  const RunResult several = run(scene, 4, kSteps, 0, 0.01, some_actions(scene));
+  EXPECT_EQ(without_worlds(several.rows), without_worlds(one.rows));
+  const RunResult paced = run(scene, 2, kSteps, 4, 0, some_actions(scene));
+  EXPECT_EQ(without_worlds(paced.rows), without_worlds(one.rows));
 }
 
 TEST(DaemonThreads, PacingChangesNothing) {
