@@ -43,6 +43,7 @@ void HashLog::close() {
 
 Collector::Collector(const CollectorOptions& options) : options_(options) {
   if (!options.hash_log.empty()) log_ = std::make_unique<HashLog>(options.hash_log);
+  if (!options.record.empty()) recorder_ = std::make_unique<RunRecorder>(options.record, options.encoded_scene);
   // The dump's header needs the scene's hash, but that the file cannot be written is said before the run.
   if (!options.dump.empty() && !std::ofstream(options.dump, std::ios::binary))
     throw ReportError(options.dump.string() + ": cannot be written");
@@ -61,7 +62,10 @@ void Collector::add(dds::Report report) {
   if (instance_of(report) != session_->instance()) return;
   std::visit(
       [this](const auto& sample) {
-        if constexpr (!std::is_same_v<std::decay_t<decltype(sample)>, wire::Session>)
+        using T = std::decay_t<decltype(sample)>;
+        if constexpr (std::is_same_v<T, wire::LogEntry> || std::is_same_v<T, wire::Control>)
+          take(sample);
+        else if constexpr (!std::is_same_v<T, wire::Session>)
           if (sample.world() < worlds_.size()) take(sample);
       },
       report);
@@ -73,6 +77,7 @@ void Collector::take(const wire::Session& session) {
   for (std::size_t i = 0; i < worlds_.size(); ++i) worlds_[i].world(static_cast<WorldId>(i));
   heard_.resize(session.worlds());
   next_.resize(session.worlds());
+  if (recorder_) recorder_->take(session);
   if (options_.dump.empty()) return;
   if (session.dump_first() < 0) throw ReportError("this session reports no states; world 0 needs --dump-steps");
   dump_.emplace(options_.dump, DumpHeader{session.scene_hash(), session.dump_first(), session.dump_last()});
@@ -104,8 +109,33 @@ void Collector::take(const wire::Digests& digests) {
   }
   for (; !sums_.empty() && sums_.front().worlds == worlds_.size(); sums_.pop_front(), ++next_whole_) {
     bodies_ = sums_.front().bodies;
-    if (log_) log_->add(next_whole_, sums_.front().bodies, sums_.front().hash);
+    whole({sums_.front().bodies, sums_.front().hash});
   }
+}
+
+// All worlds' digests of step next_whole_ are there.
+void Collector::whole(const StepDigest& digest) {
+  if (log_) log_->add(next_whole_, digest.bodies, digest.hash);
+  if (recorder_) recorder_->digest(next_whole_, digest);
+  const auto step = static_cast<std::size_t>(next_whole_);
+  if (!difference_.empty() || step >= options_.expected.size() || options_.expected[step] == digest) return;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "step %zu: %" PRIu64 " bodies %016" PRIx64 ", expected %" PRIu64 " bodies %016" PRIx64, step,
+                digest.bodies, digest.hash, options_.expected[step].bodies, options_.expected[step].hash);
+  difference_ = text;
+}
+
+void Collector::take(const wire::Poses& poses) {
+  if (recorder_) recorder_->take(poses);
+}
+
+void Collector::take(const wire::LogEntry& entry) {
+  if (recorder_) recorder_->take(entry);
+}
+
+void Collector::take(const wire::Control& control) {
+  if (recorder_) recorder_->take(control);
 }
 
 void Collector::take(const wire::StateChunk& chunk) {
@@ -139,6 +169,7 @@ void Collector::write_states() {
 
 bool Collector::complete() const {
   if (!session_ || next_whole_ <= session_->last_step()) return false;
+  if (recorder_ && !recorder_->has(session_->last_step())) return false;
   if (dump_ && next_state_ <= session_->dump_last()) return false;
   return std::all_of(worlds_.begin(), worlds_.end(),
                      [](const wire::Status& status) { return status.state() == wire::STATE_DONE; });
@@ -147,6 +178,7 @@ bool Collector::complete() const {
 void Collector::close() {
   if (log_) log_->close();
   if (dump_) dump_->close();
+  if (recorder_) recorder_->close(complete());
 }
 
 double Collector::wall_seconds() const {

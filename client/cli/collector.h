@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "client/cli/run_recorder.h"
 #include "common/dds/frames.h"
 #include "common/dump.h"
 #include "common/ids.h"
@@ -37,7 +38,9 @@ class HashLog {
 };
 
 struct CollectorOptions {
-  std::filesystem::path hash_log, dump;  // files to write; empty: none
+  std::filesystem::path hash_log, dump, record;  // files to write; empty: none
+  std::string encoded_scene;                     // for the recording
+  std::vector<StepDigest> expected;              // of steps 0, 1, ..., to be compared with; empty: nothing is
 };
 
 class Collector {
@@ -51,6 +54,8 @@ class Collector {
   void add(dds::Report report);
   // Everything up to the last step has been heard of all worlds, and all say that they are done.
   bool complete() const;
+  // "step 17: ..." for the first step that is not as expected, or "".
+  const std::string& difference() const { return difference_; }
   // Completes the files with what has been heard.
   void close();
 
@@ -78,11 +83,17 @@ class Collector {
   void take(const wire::Status& status);
   void take(const wire::Digests& digests);
   void take(const wire::StateChunk& chunk);
+  void take(const wire::Poses& poses);
+  void take(const wire::LogEntry& entry);
+  void take(const wire::Control& control);
+  void whole(const StepDigest& digest);
   void write_states();
 
   const CollectorOptions options_;
   std::unique_ptr<HashLog> log_;
   std::optional<DumpWriter> dump_;
+  std::unique_ptr<RunRecorder> recorder_;
+  std::string difference_;
   std::deque<dds::Report> early_;  // heard before the session's description
   std::optional<wire::Session> session_;
   std::vector<wire::Status> worlds_;

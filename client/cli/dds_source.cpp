@@ -4,11 +4,20 @@
 
 namespace soda::cli {
 
-DdsSource::DdsSource(const dds::NetworkOptions& network, const std::string& session, bool with_states)
+DdsSource::DdsSource(const dds::NetworkOptions& network, const std::string& session, bool with_states,
+                     bool for_recording)
     : participant_(network, session, "soda") {
   if (with_states)
     states_.emplace(participant_, dds::states_topic(),
                     [this](wire::StateChunk&& sample, const dds::WriterKey&) { push(std::move(sample)); });
+  if (for_recording) {
+    poses_.emplace(participant_, dds::poses_topic(),
+                   [this](wire::Poses&& sample, const dds::WriterKey&) { push(std::move(sample)); });
+    log_.emplace(participant_, dds::action_log_topic(),
+                 [this](wire::LogEntry&& sample, const dds::WriterKey&) { push(std::move(sample)); });
+    control_.emplace(participant_, dds::control_topic(),
+                     [this](wire::Control&& sample, const dds::WriterKey&) { push(std::move(sample)); });
+  }
   digests_.emplace(participant_, dds::digests_topic(),
                    [this](wire::Digests&& sample, const dds::WriterKey&) { push(std::move(sample)); });
   status_.emplace(participant_, dds::status_topic(),

@@ -13,8 +13,10 @@ namespace soda::cli {
 
 class DdsSource final : public ReportSource {
  public:
-  // `with_states`: also the whole states of the steps that the session dumps.
-  DdsSource(const dds::NetworkOptions& network, const std::string& session, bool with_states);
+  // `with_states`: also the whole states of the steps that the session dumps. `for_recording`: also poses, the action
+  // log and Control.
+  DdsSource(const dds::NetworkOptions& network, const std::string& session, bool with_states,
+            bool for_recording = false);
 
   std::optional<dds::Report> next(std::chrono::milliseconds at_most) override;
 
@@ -26,6 +28,9 @@ class DdsSource final : public ReportSource {
   std::condition_variable changed_;
   std::deque<dds::Report> queue_;
   std::optional<dds::Reader<wire::StateChunk>> states_;
+  std::optional<dds::Reader<wire::Poses>> poses_;
+  std::optional<dds::Reader<wire::LogEntry>> log_;
+  std::optional<dds::Reader<wire::Control>> control_;
   std::optional<dds::Reader<wire::Digests>> digests_;
   std::optional<dds::Reader<wire::Status>> status_;
   std::optional<dds::Reader<wire::Session>> session_;

@@ -9,6 +9,7 @@
 #include "client/cli/diff_command.h"
 #include "client/cli/run_command.h"
 #include "client/cli/scene_command.h"
+#include "client/cli/verify_command.h"
 #include "client/cli/watch_command.h"
 #include "common/version.h"
 
@@ -24,6 +25,7 @@ int main(int argc, char** argv) {
   soda::cli::add_act_command(app, exit_code);
   soda::cli::add_pace_commands(app, exit_code);
   soda::cli::add_diff_command(app, exit_code);
+  soda::cli::add_verify_command(app, exit_code);
   soda::add_scene_command(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -31,6 +31,7 @@ class Follower {
     auto last_end = Clock::now();
     for (;;) {
       hear();
+      if (!collector_.difference().empty()) return kExitDifferent;
       if (collector_.complete()) return let_end();
       if (signals_.received() != 0) return 128 + signals_.received();
       for (const Ended& ended : processes_.poll()) {
@@ -102,7 +103,7 @@ int follow(ReportSource& source, Processes& processes, Table& table, StopSignals
   try {
     collector.close();
     if (!options.stats.empty()) write_stats(options.stats, collector, complete);
-  } catch (const ReportError& e) {
+  } catch (const std::runtime_error& e) {  // a file that cannot be written
     table.say(std::string("error: ") + e.what());
     code = kExitFailed;
   }

@@ -150,6 +150,20 @@ class FirstError : public gp::io::ErrorCollector {
   std::string message;
 };
 
+std::vector<WantedAction> read_all(const pb::ActionFile& file, const std::string& source, const Scene& scene) {
+  std::vector<WantedAction> actions;
+  for (int i = 0; i < file.action_size(); ++i) {
+    const std::string where = source + ": action " + std::to_string(i + 1) + ": ";
+    try {
+      actions.push_back(from_proto(file.action(i), scene));
+      if (!actions.back().step) throw ActionError("must say when: step or time");
+    } catch (const ActionError& e) {
+      throw ActionError(where + e.what());
+    }
+  }
+  return actions;
+}
+
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
@@ -251,6 +265,18 @@ std::string encode_action(const LoggedAction& logged) {
   return bytes;
 }
 
+std::string encode_actions(const std::vector<LoggedAction>& log) {
+  pb::ActionFile file;
+  for (const LoggedAction& entry : log) *file.add_action() = to_proto(entry);
+  return file.SerializeAsString();
+}
+
+std::vector<WantedAction> decode_actions(std::string_view bytes, const Scene& scene) {
+  pb::ActionFile file;
+  if (!file.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) throw ActionError("not a list of actions");
+  return read_all(file, "the actions handed over", scene);
+}
+
 std::vector<WantedAction> actions_from_text(std::string_view text, const std::string& source, const Scene& scene) {
   if (text.size() >= std::size_t{1} << 31) throw ActionError(source + ": is larger than 2 GiB");
   pb::ActionFile file;
@@ -259,17 +285,7 @@ std::vector<WantedAction> actions_from_text(std::string_view text, const std::st
   parser.RecordErrorsTo(&error);
   gp::io::ArrayInputStream stream(text.data(), static_cast<int>(text.size()));
   if (!parser.Parse(&stream, &file)) throw ActionError(source + ":" + error.message);
-  std::vector<WantedAction> actions;
-  for (int i = 0; i < file.action_size(); ++i) {
-    const std::string where = source + ": action " + std::to_string(i + 1) + ": ";
-    try {
-      actions.push_back(from_proto(file.action(i), scene));
-      if (!actions.back().step) throw ActionError("must say when: step or time");
-    } catch (const ActionError& e) {
-      throw ActionError(where + e.what());
-    }
-  }
-  return actions;
+  return read_all(file, source, scene);
 }
 
 std::vector<WantedAction> load_actions(const std::filesystem::path& path, const Scene& scene) {

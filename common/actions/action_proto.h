@@ -34,6 +34,10 @@ pb::Action to_proto(const LoggedAction& logged);
 WantedAction decode_action(std::string_view bytes, const Scene& scene);
 std::string encode_action(const LoggedAction& logged);
 
+// A pb.ActionFile in bytes, for programs that hand one to another.
+std::string encode_actions(const std::vector<LoggedAction>& log);
+std::vector<WantedAction> decode_actions(std::string_view bytes, const Scene& scene);
+
 // A text file of actions (.txtpb of pb.ActionFile). Throws ActionError with file, number of the action and field.
 std::vector<WantedAction> load_actions(const std::filesystem::path& path, const Scene& scene);
 std::vector<WantedAction> actions_from_text(std::string_view text, const std::string& source, const Scene& scene);

@@ -93,6 +93,12 @@ bool lengths_fit<wire::StateChunk>(Cdr& cdr) {
 }
 
 template <>
+bool lengths_fit<wire::Poses>(Cdr& cdr) {
+  skip<std::uint64_t, std::uint32_t, std::int64_t, std::uint32_t>(cdr);
+  return pass_sequence<std::uint64_t>(cdr) && pass_sequence<float>(cdr);
+}
+
+template <>
 bool lengths_fit<wire::Transforms>(Cdr& cdr) {
   skip<std::uint64_t, std::uint32_t, std::int64_t, double>(cdr);
   std::uint32_t length = 0;
@@ -189,6 +195,16 @@ std::string problem(const wire::StateChunk& s) {
   if (s.bodies().size() / sizeof(BodyState) > s.bodies_total() ||
       s.contacts().size() / sizeof(ContactRecord) > s.contacts_total())
     return "more records than announced";
+  return "";
+}
+
+std::string problem(const wire::Poses& s) {
+  if (s.world() >= kMaxWorlds) return "impossible world";
+  if (!ok_step(s.step())) return "impossible step";
+  if (s.ids().size() > kMaxPoses || s.ids().size() > s.total() || s.values().size() != 7 * s.ids().size())
+    return "bad lengths";
+  if (!std::all_of(s.values().begin(), s.values().end(), [](float v) { return std::isfinite(v); }))
+    return "a value that is not finite";
   return "";
 }
 

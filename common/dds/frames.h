@@ -13,7 +13,8 @@
 namespace soda::dds {
 
 // What a world reports to whoever started it, over DDS or a pipe. The index is the kind in a frame.
-using Report = std::variant<wire::Session, wire::Status, wire::Digests, wire::StateChunk>;
+using Report = std::variant<wire::Session, wire::Status, wire::Digests, wire::StateChunk, wire::Poses, wire::LogEntry,
+                            wire::Control>;
 
 class FrameWriter {
  public:

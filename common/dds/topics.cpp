@@ -53,6 +53,8 @@ Topic digests_topic() { return {"soda/digests", all(2400, Millis(1000))}; }
 // At most 16 MiB in flight.
 Topic states_topic() { return {"soda/states", all(32, Millis(1000))}; }
 
+Topic poses_topic() { return {"soda/poses", all(256, Millis(1000))}; }
+
 // A slow viewer misses steps; nobody waits for it.
 Topic transforms_topic() {
   Topic topic{"soda/transforms", newest(kManyWorlds)};

@@ -37,6 +37,7 @@ Topic action_log_topic();                      // LogEntry
 Topic status_topic();                          // Status
 Topic digests_topic();                         // Digests
 Topic states_topic();                          // StateChunk
+Topic poses_topic();                           // Poses
 Topic transforms_topic();                      // Transforms
 Topic border_topic(WorldId from, WorldId to);  // Border
 

@@ -44,7 +44,8 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
       reports_(reports),
       model_(std::move(scene)),
       map_(bisect(model_.scene(), make_grid(model_.scene()), settings.worlds)),
-      recorder_(settings.instance, settings.me, model_.scene().dt, settings.dump_first, settings.dump_last, reports) {
+      recorder_(settings.instance, settings.me, model_.scene().dt, settings.dump_first, settings.dump_last,
+                settings.pose_every, reports) {
   border::CoreSettings core;
   core.me = settings.me;
   core.epoch = settings.epoch;

@@ -31,6 +31,7 @@ struct DaemonSettings {
   border::Sync sync = border::Sync::kAnticipative;
   Step window = 48;                      // K
   Step dump_first = -1, dump_last = -1;  // states to report; -1: none
+  Step pose_every = 0;                   // steps whose poses are reported; 0: none
 };
 
 class Daemon {

@@ -18,17 +18,20 @@ void write_surely(dds::Writer<T>& writer, const T& sample, const std::function<b
 
 }  // namespace
 
-DdsReports::DdsReports(dds::Participant& participant, bool supervised, bool with_states, std::function<bool()> give_up)
+DdsReports::DdsReports(dds::Participant& participant, bool supervised, bool with_states, bool with_poses,
+                       std::function<bool()> give_up)
     : supervised_(supervised),
       give_up_(std::move(give_up)),
       status_(participant, dds::status_topic()),
       digests_(participant, dds::digests_topic()),
       transforms_(participant, dds::transforms_topic()) {
   if (with_states) states_ = std::make_unique<dds::Writer<wire::StateChunk>>(participant, dds::states_topic());
+  if (with_poses) poses_ = std::make_unique<dds::Writer<wire::Poses>>(participant, dds::poses_topic());
 }
 
 bool DdsReports::listened_to() const {
-  return !supervised_ || (digests_.matched() && status_.matched() && (!states_ || states_->matched()));
+  return !supervised_ || (digests_.matched() && status_.matched() && (!states_ || states_->matched()) &&
+                          (!poses_ || poses_->matched()));
 }
 
 // A status that cannot be written is not worth waiting for: the next one says more.
@@ -41,6 +44,11 @@ void DdsReports::state(const wire::StateChunk& sample) {
   write_surely(*states_, sample, give_up_);
 }
 
+void DdsReports::poses(const wire::Poses& sample) {
+  if (!poses_) throw std::logic_error("this session has no poses to report");
+  write_surely(*poses_, sample, give_up_);
+}
+
 void DdsReports::transforms(const wire::Transforms& sample) { transforms_.write(sample); }
 
 bool DdsReports::finish(std::chrono::milliseconds at_most) {
@@ -51,6 +59,7 @@ bool DdsReports::finish(std::chrono::milliseconds at_most) {
   };
   bool all = digests_.wait_acknowledged(left());
   all = status_.wait_acknowledged(left()) && all;
+  if (poses_) all = poses_->wait_acknowledged(left()) && all;
   if (states_) all = states_->wait_acknowledged(left()) && all;
   return all;
 }

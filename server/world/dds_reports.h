@@ -10,14 +10,16 @@ namespace soda::world {
 
 class DdsReports final : public Reports {
  public:
-  // `supervised`: somebody waits for this world's digests, and must have been met before the start. `with_states`:
-  // whole states are to be reported. `give_up` ends the waiting for a slow reader.
-  DdsReports(dds::Participant& participant, bool supervised, bool with_states, std::function<bool()> give_up);
+  // `supervised`: somebody waits for this world's digests, and must have been met before the start. `with_states`,
+  // `with_poses`: whole states, or poses, are to be reported. `give_up` ends the waiting for a slow reader.
+  DdsReports(dds::Participant& participant, bool supervised, bool with_states, bool with_poses,
+             std::function<bool()> give_up);
 
   bool listened_to() const override;
   void status(const wire::Status& sample) override;
   void digests(const wire::Digests& sample) override;
   void state(const wire::StateChunk& sample) override;
+  void poses(const wire::Poses& sample) override;
   bool wants_transforms() const override { return transforms_.matched(); }
   void transforms(const wire::Transforms& sample) override;
   bool finish(std::chrono::milliseconds at_most) override;
@@ -29,6 +31,7 @@ class DdsReports final : public Reports {
   dds::Writer<wire::Digests> digests_;
   dds::Writer<wire::Transforms> transforms_;
   std::unique_ptr<dds::Writer<wire::StateChunk>> states_;
+  std::unique_ptr<dds::Writer<wire::Poses>> poses_;
 };
 
 }  // namespace soda::world

@@ -98,6 +98,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.add_option("--dump-steps", dump, "A[:B]: report the whole states of these steps")->group(group);
   dds::add_network_options(app, o.network);
   const char* hidden = "";
+  app.add_option("--actions-fd", o.actions_fd)->group(hidden);
+  app.add_option("--pose-every", o.pose_every)->check(CLI::Range(Step{0}, Step{1000000}))->group(hidden);
   app.add_option("--scene-fd", o.scene_fd)->group(hidden);
   app.add_option("--report-fd", o.report_fd)->group(hidden);
   app.add_option("--supervised-by", o.supervised_by)->group(hidden);

@@ -28,6 +28,8 @@ struct Options {
   Step window = kDefaultWindow;
   Step lead = kDefaultLead;
   std::string actions;  // file
+  int actions_fd = -1;  // of an encoded pb.ActionFile, instead
+  Step pose_every = 0;  // steps whose poses are reported; 0: none
   Step dump_first = -1, dump_last = -1;
 
   // For those that start soda-world themselves.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <mutex>
 
 #include "common/dds/frames.h"
 #include "server/world/reports.h"
@@ -22,15 +23,21 @@ class PipeReports final : public Reports {
   }
   void digests(const wire::Digests& sample) override { write(sample); }
   void state(const wire::StateChunk& sample) override { write(sample); }
+  void poses(const wire::Poses& sample) override { write(sample); }
+  // What the session service says; from its thread.
+  void control(const wire::Control& sample) { write(sample); }
+  void entry(const wire::LogEntry& sample) { write(sample); }
   bool wants_transforms() const override { return false; }
   void transforms(const wire::Transforms&) override {}
   bool finish(std::chrono::milliseconds) override { return true; }  // what is in the pipe stays there
 
  private:
   void write(const dds::Report& report) {
+    const std::lock_guard lock(mutex_);
     if (fd_ >= 0) out_.write(report);
   }
 
+  std::mutex mutex_;
   int fd_;
   dds::FrameWriter out_;
   std::function<void(const wire::Status&)> on_status_;

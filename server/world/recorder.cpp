@@ -33,8 +33,15 @@ std::span<const T> take(std::span<const T>& rest, std::size_t& room) {
 
 }  // namespace
 
-Recorder::Recorder(std::uint64_t instance, WorldId me, double dt, Step dump_first, Step dump_last, Reports& reports)
-    : instance_(instance), me_(me), dt_(dt), dump_first_(dump_first), dump_last_(dump_last), reports_(reports) {
+Recorder::Recorder(std::uint64_t instance, WorldId me, double dt, Step dump_first, Step dump_last, Step pose_every,
+                   Reports& reports)
+    : instance_(instance),
+      me_(me),
+      dt_(dt),
+      dump_first_(dump_first),
+      dump_last_(dump_last),
+      pose_every_(pose_every),
+      reports_(reports) {
   batch_.instance(instance);
   batch_.world(me);
 }
@@ -48,6 +55,7 @@ void Recorder::finalised(Step step, const border::Produced& produced) {
   batch_.hashes().push_back(produced.hash());
   if (batch_.hashes().size() >= kBatchSteps) flush();
   if (dump_first_ >= 0 && step >= dump_first_ && step <= dump_last_) report_state(step, produced.all());
+  if (pose_every_ > 0 && step % pose_every_ == 0) report_poses(step, produced.all());
   if (reports_.wants_transforms()) report_transforms(step, produced.all());
 }
 
@@ -77,6 +85,37 @@ void Recorder::report_state(Step step, const BodySet& produced) {
     chunk.contacts(octets(take(contacts, room)));
     reports_.state(chunk);
   } while (!bodies.empty() || !contacts.empty());
+}
+
+void Recorder::report_poses(Step step, const BodySet& produced) {
+  std::vector<std::pair<BodyId, Pose7>> moved;
+  for (const BodyState& body : produced.bodies) {
+    Pose7 pose;
+    for (int i = 0; i < 3; ++i) pose[i] = static_cast<float>(body.position[i]);
+    for (int i = 0; i < 4; ++i) pose[3 + i] = static_cast<float>(body.orientation[i]);
+    auto& [when, last] = posed_[body.id];
+    // A body that was elsewhere in between may have moved there and back.
+    if (when != step - pose_every_ || last != pose) moved.emplace_back(body.id, pose);
+    when = step;
+    last = pose;
+  }
+  wire::Poses sample;
+  sample.instance(instance_);
+  sample.world(me_);
+  sample.step(step);
+  sample.total(static_cast<std::uint32_t>(moved.size()));
+  for (std::size_t first = 0;; first += dds::kMaxPoses) {
+    const std::size_t end = std::min(moved.size(), first + dds::kMaxPoses);
+    sample.ids().clear();
+    sample.values().clear();
+    for (std::size_t i = first; i < end; ++i) {
+      sample.ids().push_back(moved[i].first);
+      sample.values().insert(sample.values().end(), moved[i].second.begin(), moved[i].second.end());
+    }
+    reports_.poses(sample);
+    if (end == moved.size()) break;
+  }
+  std::erase_if(posed_, [&](const auto& entry) { return entry.second.first != step; });
 }
 
 void Recorder::report_transforms(Step step, const BodySet& produced) {

@@ -2,8 +2,11 @@
 // anybody wants them.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
+#include <unordered_map>
+#include <utility>
 
 #include "server/border/world_core.h"
 #include "server/world/reports.h"
@@ -14,7 +17,9 @@ class Recorder final : public border::Observer {
  public:
   using Clock = std::chrono::steady_clock;
   // States of steps dump_first .. dump_last are reported; -1: none.
-  Recorder(std::uint64_t instance, WorldId me, double dt, Step dump_first, Step dump_last, Reports& reports);
+  // Poses of every pose_every-th step are; 0: none.
+  Recorder(std::uint64_t instance, WorldId me, double dt, Step dump_first, Step dump_last, Step pose_every,
+           Reports& reports);
 
   void finalised(Step step, const border::Produced& produced) override;
 
@@ -25,13 +30,16 @@ class Recorder final : public border::Observer {
  private:
   void report_state(Step step, const BodySet& produced);
   void report_transforms(Step step, const BodySet& produced);
+  void report_poses(Step step, const BodySet& produced);
 
   const std::uint64_t instance_;
   const WorldId me_;
   const double dt_;
-  const Step dump_first_, dump_last_;
+  const Step dump_first_, dump_last_, pose_every_;
   Reports& reports_;
   wire::Digests batch_;
+  using Pose7 = std::array<float, 7>;
+  std::unordered_map<BodyId, std::pair<Step, Pose7>> posed_;  // what was reported last of each body, and when
   Clock::time_point batch_since_{};
 };
 

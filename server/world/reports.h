@@ -18,6 +18,7 @@ class Reports {
   virtual void status(const wire::Status& sample) = 0;
   virtual void digests(const wire::Digests& sample) = 0;
   virtual void state(const wire::StateChunk& sample) = 0;
+  virtual void poses(const wire::Poses& sample) = 0;
   virtual bool wants_transforms() const = 0;
   virtual void transforms(const wire::Transforms& sample) = 0;
   // Blocks until everything has been acknowledged, or the time is up: false.

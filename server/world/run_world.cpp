@@ -40,13 +40,13 @@ struct EncodedScene {
   std::string bytes;
 };
 
-std::string read_all(int fd) {
+std::string read_all(int fd, const char* what) {
   std::string bytes;
   char buffer[1 << 16];
   for (;;) {
     const ssize_t n = ::read(fd, buffer, sizeof buffer);
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw std::system_error(errno, std::generic_category(), "reading the scene");
+    if (n < 0) throw std::system_error(errno, std::generic_category(), std::string("reading ") + what);
     if (n == 0) return bytes;
     bytes.append(buffer, static_cast<std::size_t>(n));
   }
@@ -58,7 +58,7 @@ EncodedScene scene_of(const Options& options) {
     std::string bytes = encode_scene(scene);
     return {std::move(scene), std::move(bytes)};
   }
-  std::string bytes = read_all(options.scene_fd);
+  std::string bytes = read_all(options.scene_fd, "the scene");
   ::close(options.scene_fd);
   return {decode_scene(bytes, "the scene handed over"), std::move(bytes)};
 }
@@ -89,6 +89,7 @@ wire::Session describe(const Options& options, const EncodedScene& scene) {
   s.pace(options.pace);
   s.dump_first(options.dump_first);
   s.dump_last(options.dump_last);
+  s.pose_every(static_cast<std::uint32_t>(options.pose_every));
   return s;
 }
 
@@ -103,6 +104,7 @@ DaemonSettings settings_of(const wire::Session& session, const Options& options)
   settings.window = session.window();
   settings.dump_first = session.dump_first();
   settings.dump_last = session.dump_last();
+  settings.pose_every = session.pose_every();
   return settings;
 }
 
@@ -124,6 +126,7 @@ SessionListener listener_of(Daemon& daemon) {
 }
 
 std::vector<WantedAction> actions_of(const Options& options, const Scene& scene) {
+  if (options.actions_fd >= 0) return decode_actions(read_all(options.actions_fd, "the actions"), scene);
   return options.actions.empty() ? std::vector<WantedAction>() : load_actions(options.actions, scene);
 }
 
@@ -171,7 +174,16 @@ int run_single(const Options& options, StopSignals& signals) {
   std::vector<WantedAction> actions = actions_of(options, *shared);
   Daemon daemon(std::move(scene.scene), settings_of(session, options), transport, reports);
   const SessionListener listening = listener_of(daemon);
-  SessionService service(session, shared, std::move(actions), {listening.control, listening.entry, [](const auto&) {}});
+  SessionService service(session, shared, std::move(actions),
+                         {[&](const wire::Control& control) {
+                            reports.control(control);
+                            listening.control(control);
+                          },
+                          [&](const wire::LogEntry& entry) {
+                            reports.entry(entry);
+                            listening.entry(entry);
+                          },
+                          [](const auto&) {}});
   listener = &service;
   return run(daemon, options, signals);
 }
@@ -185,7 +197,7 @@ int run_host(const Options& options, StopSignals& signals) {
   EncodedScene scene = scene_of(options);
   const wire::Session session = describe(options, scene);
   dds::Participant participant(options.network, options.session, "soda-world-0");
-  DdsReports reports(participant, options.supervised_by != 0, session.dump_first() >= 0,
+  DdsReports reports(participant, options.supervised_by != 0, session.dump_first() >= 0, session.pose_every() > 0,
                      [&] { return signals.received() != 0; });
   DdsTransport transport(participant, options.world);
   const auto shared = std::make_shared<const Scene>(scene.scene);
@@ -274,7 +286,8 @@ int run_guest(const Options& options, StopSignals& signals) {
   spdlog::info("admitted to session '{}' as world {} of {}", options.session, options.world, session.worlds());
   Scene scene = decode_scene(admitted->encoded_scene, "the scene of session '" + options.session + "'");
   admitted->encoded_scene = {};
-  DdsReports reports(participant, options.supervised_by != 0, session.dump_first() >= 0, stop);
+  DdsReports reports(participant, options.supervised_by != 0, session.dump_first() >= 0, session.pose_every() > 0,
+                     stop);
   DdsTransport transport(participant, options.world);
   Daemon daemon(std::move(scene), settings_of(session, options), transport, reports);
   // The guest outlives the daemon, and must not talk to it then, whatever happens.

@@ -28,6 +28,7 @@ wire::Session good_session() {
   s.last_step(600);
   s.sync(wire::SYNC_CONSERVATIVE);
   s.window(48);
+  s.lead(6);
   s.dt(1.0 / 60);
   s.dump_first(-1);
   s.dump_last(-1);
@@ -68,6 +69,31 @@ wire::Border good_border() {
   return s;
 }
 
+wire::Poses good_poses() {
+  wire::Poses s;
+  s.world(1);
+  s.step(30);
+  s.total(2);
+  s.ids({4, 9});
+  s.values(std::vector<float>(14, 0.5f));
+  return s;
+}
+
+wire::Request good_request() {
+  wire::Request s;
+  s.client(5);
+  s.number(1);
+  s.action({1, 2, 3});
+  return s;
+}
+
+wire::LogEntry good_entry() {
+  wire::LogEntry s;
+  s.number(1);
+  s.action({1, 2, 3});
+  return s;
+}
+
 template <class T>
 void expect_round_trip(const T& sample) {
   T back;
@@ -81,7 +107,11 @@ TEST(Wire, ComesBack) {
   expect_round_trip(good_state());
   expect_round_trip(good_transforms());
   expect_round_trip(good_border());
+  expect_round_trip(good_poses());
+  expect_round_trip(good_request());
+  expect_round_trip(good_entry());
   expect_round_trip(wire::Control());
+  expect_round_trip(wire::Answer());
   expect_round_trip(wire::Status());
 }
 
@@ -107,6 +137,9 @@ TEST(Wire, TruncatedOrScrambledIsRefusedOrHarmless) {
   expect_never_crashes(good_state());
   expect_never_crashes(good_transforms());
   expect_never_crashes(good_border());
+  expect_never_crashes(good_poses());
+  expect_never_crashes(good_request());
+  expect_never_crashes(good_entry());
 }
 
 // A sequence that claims four thousand million elements in a sample of a few bytes would have Fast CDR allocate them.
@@ -150,6 +183,16 @@ TEST(Wire, ImpossibleValuesAreRefused) {
   refused(good_state(), [](auto& s) { s.bodies_total(0); });
   refused(good_transforms(), [](auto& s) { s.bodies()[1].position()[2] = std::numeric_limits<double>::infinity(); });
   refused(good_border(), [](auto& s) { s.to(kMaxWorlds); });
+  refused(good_session(), [](auto& s) { s.lead(0); });
+  refused(good_poses(), [](auto& s) { s.ids().pop_back(); });
+  refused(good_poses(), [](auto& s) { s.total(1); });
+  refused(good_poses(), [](auto& s) { s.values()[9] = std::numeric_limits<float>::quiet_NaN(); });
+  refused(good_request(), [](auto& s) { s.client(0); });
+  refused(good_request(), [](auto& s) { s.kind(77); });
+  refused(good_request(), [](auto& s) { s.value(-1); });
+  refused(good_entry(), [](auto& s) { s.number(0); });
+  refused(wire::Answer(), [](auto& s) { s.step(-1); });
+  refused(wire::Control(), [](auto& s) { s.closed(-1); });
   refused(wire::Control(), [](auto& s) { s.phase(4); });
   refused(wire::Status(), [](auto& s) { s.state(9); });
   refused(wire::Status(), [](auto& s) { s.final_step(5); });  // beyond the clock

@@ -57,6 +57,7 @@ class LedgerReports final : public Reports {
   void status(const wire::Status& sample) override { on_status_(sample); }
   void digests(const wire::Digests& sample) override { ledger_.add(sample); }
   void state(const wire::StateChunk&) override {}
+  void poses(const wire::Poses&) override {}
   bool wants_transforms() const override { return true; }
   void transforms(const wire::Transforms& sample) override { transforms_ += sample.bodies().size(); }
   bool finish(std::chrono::milliseconds) override { return true; }
