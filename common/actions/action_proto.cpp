@@ -67,7 +67,7 @@ Action read(const pb::SetPose& m, const Scene&) {
   if (!m.has_pose()) throw ActionError("pose.pose: must be given");
   const Pose pose = read_pose(m.pose(), "pose.pose");
   (void)no_longer(m.pose().position(), kMaxCoordinate, "pose.pose.position", " m");
-  return SetPose{body_id(m.body(), "pose.body"), pose.position, normalized(pose.orientation)};
+  return SetPose{body_id(m.body(), "pose.body"), pose.position, pose.orientation};
 }
 
 Action read(const pb::Grab& m, const Scene&) {

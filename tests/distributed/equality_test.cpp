@@ -33,20 +33,30 @@ class Equality : public SessionTest, public ::testing::WithParamInterface<Case> 
 
 constexpr int kSteps = 600;
 
+enum class When {
+  kAlways,
+  kMostWorlds,
+  kAll
+};  // the last: in the whole matrix only, with the largest number of worlds
 struct Way {
   const char* name;
   std::vector<std::string> arguments;
-  bool anticipates;
-  bool always;  // else only with the largest number of worlds
+  bool anticipates, acts;
+  When when;
 };
-const Way kWays[] = {{"", {}, true, true},
-                     {"-short", {"--anticipation", "4"}, true, false},
-                     {"-conservative", {"--sync", "conservative"}, false, false}};
+const Way kWays[] = {{"", {"--pace", "max"}, true, false, When::kAlways},
+                     {"-short", {"--pace", "max", "--anticipation", "4"}, true, false, When::kAll},
+                     {"-conservative", {"--pace", "max", "--sync", "conservative"}, false, false, When::kMostWorlds},
+                     {"-acted", {"--pace", "max"}, true, true, When::kAlways},
+                     {"-acted-rate", {"--pace", "3"}, true, true, When::kMostWorlds},
+                     {"-acted-realtime", {"--pace", "realtime"}, true, true, When::kAll},
+                     {"-acted-conservative", {"--pace", "max", "--sync", "conservative"}, false, true, When::kAll}};
 
 TEST_P(Equality, AnyNumberOfWorldsGivesTheHashesOfOne) {
   const Case& c = GetParam();
   const bool is_file = std::string(c.scene).find('.') != std::string::npos;
-  const std::string file = is_file ? std::string(SODA_SCENES) + "/" + c.scene : scene(c.scene, c.bodies, c.cell);
+  const std::string file = is_file ? path("converted.scene") : scene(c.scene, c.bodies, c.cell);
+  if (is_file) run({"scene", "convert", std::string(SODA_SCENES) + "/" + c.scene, file});
   const std::string steps = std::to_string(kSteps);
   run({"run", file, "--sync", "single", "--steps", steps, "--pace", "max", "-q", "--hash-log", path("single.log"),
        "--dump", path("single.dump")},
@@ -61,10 +71,21 @@ TEST_P(Equality, AnyNumberOfWorldsGivesTheHashesOfOne) {
   EXPECT_EQ(bodies_first, bodies_last);
   EXPECT_NE(hash_first, hash_last);
 
+  // The same with things done to bodies: all of it known from the start, so that it is the same run.
+  const std::string acts = actions(file, kSteps, 30, 1);
+  run({"run", file, "--sync", "single", "--steps", steps, "--pace", "max", "-q", "--actions", acts, "--hash-log",
+       path("acted.log"), "--dump", path("acted.dump")},
+      0, 900s);
+  EXPECT_NE(lines_of(path("acted.log")).back(), reference.back());
+  const bool whole_matrix =
+      std::string(::testing::UnitTest::GetInstance()->current_test_suite()->name()).starts_with("All");
+
   for (const int worlds : c.worlds) {
     const bool most = worlds == c.worlds.back();
     for (const Way& way : kWays) {
-      if (!way.always && !most) continue;
+      if (way.when != When::kAlways && !most) continue;
+      if (way.when == When::kAll && !whole_matrix) continue;
+      if (way.acts && way.when == When::kAlways && !most && !whole_matrix) continue;
       SCOPED_TRACE(std::to_string(worlds) + " worlds, " + way.name);
       const std::string n = std::to_string(worlds) + way.name;
       std::vector<std::string> arguments{"run",
@@ -73,8 +94,6 @@ TEST_P(Equality, AnyNumberOfWorldsGivesTheHashesOfOne) {
                                          std::to_string(worlds),
                                          "--steps",
                                          steps,
-                                         "--pace",
-                                         "max",
                                          "-q",
                                          "--stats",
                                          path(n + ".json"),
@@ -83,11 +102,14 @@ TEST_P(Equality, AnyNumberOfWorldsGivesTheHashesOfOne) {
                                          "--dump",
                                          path(n + ".dump")};
       arguments.insert(arguments.end(), way.arguments.begin(), way.arguments.end());
+      if (way.acts) arguments.insert(arguments.end(), {"--actions", acts});
       run(arguments, 0, 900s);
       ASSERT_FALSE(HasFailure());
-      expect_equal_logs(path("single.log"), path(n + ".log"));
-      run({"diff", path("single.log"), path(n + ".log")});
-      run({"diff", path("single.dump"), path(n + ".dump")});  // sleep counters and contact records, too
+      const std::string single = way.acts ? "acted" : "single";
+      expect_equal_logs(path(single + ".log"), path(n + ".log"));
+      run({"diff", path(single + ".log"), path(n + ".log")});
+      run({"diff", path(single + ".dump"), path(n + ".dump")});  // sleep counters and contact records, too
+      EXPECT_EQ(stat(path(n + ".json"), "actions") > 10, way.acts);
       if (worlds >= c.mixes_from) {
         EXPECT_GT(stat(path(n + ".json"), "mixed_islands"), 0);
       }

@@ -1,5 +1,6 @@
 #include "tests/distributed/session.h"
 
+#include <google/protobuf/text_format.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -7,8 +8,10 @@
 #include <random>
 #include <sstream>
 
+#include "common/actions/action_proto.h"
 #include "common/scene/generators.h"
 #include "common/scene/scene_file.h"
+#include "tests/support/random_actions.h"
 
 namespace soda::test {
 
@@ -35,6 +38,17 @@ std::string SessionTest::scene(const std::string& generator, std::uint32_t bodie
   scene.territory_cell = cell;
   save_scene(scene, file);
   return file;
+}
+
+std::string SessionTest::actions(const std::string& scene_file, Step steps, std::size_t count,
+                                 std::uint64_t seed) const {
+  pb::ActionFile file;
+  for (const LoggedAction& entry : random_actions(load_scene(scene_file), steps, count, false, seed))
+    *file.add_action() = to_proto(entry);
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(file, &text);
+  std::ofstream(path("actions.txtpb")) << text;
+  return path("actions.txtpb");
 }
 
 namespace {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/ids.h"
 #include "tests/distributed/program.h"
 
 namespace soda::test {
@@ -27,6 +28,9 @@ class SessionTest : public ::testing::Test {
   static std::string new_session();
   // The file of a generated scene. `cell`: edge of a territory cell in m, 0: chosen by the program.
   std::string scene(const std::string& generator, std::uint32_t bodies, double cell = 0) const;
+
+  // A file of actions, on bodies of that scene file (.scene), at steps up to `steps`.
+  std::string actions(const std::string& scene_file, Step steps, std::size_t count, std::uint64_t seed) const;
 
   static std::vector<std::string> soda(const std::vector<std::string>& arguments);
   static std::vector<std::string> soda_world(const std::vector<std::string>& arguments);

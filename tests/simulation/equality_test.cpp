@@ -114,6 +114,30 @@ TEST(Sleep, NothingIsSentForWhatSleeps) {
   EXPECT_EQ(slept.total.frames_sent, half.total.frames_sent) << "frames were sent for sleeping bodies";
 }
 
+// What rests on a body that is taken away, or put elsewhere, must fall, though nothing else tells it to wake.
+TEST(Actions, WhatRestedOnABodyFallsWhenItIsGone) {
+  SceneBuilder builder("sleeping stacks");
+  builder.add_ground(100);
+  for (int x = 0; x < 6; ++x)
+    for (int z = 0; z < 3; ++z) builder.add(Box{Vec3(0.8, 0.8, 0.8)}, Vec3(2.0 * x, 0, 0.4 + 0.8 * z));
+  const Scene scene = builder.finish();
+  constexpr Step kSteps = 220, kWhen = 150;
+  const Actions log = {{1, kWhen, Remove{1}}, {2, kWhen, SetPose{10, Vec3(-20, 3, 5)}}};
+  const auto expected = run_single(scene, kSteps, log);
+  EXPECT_EQ(expected[kWhen - 2], expected[kWhen - 1]) << "they do not sleep";
+  for (Step t = kWhen; t < kWhen + 20; ++t) EXPECT_NE(expected[t].hash, expected[t + 1].hash) << "step " << t;
+  EXPECT_EQ(expected[kWhen].bodies, 18u);
+  EXPECT_EQ(expected[kWhen + 1].bodies, 17u);
+  for (const border::Sync sync : {border::Sync::kAnticipative, border::Sync::kConservative}) {
+    NetworkSettings network;
+    network.sync = sync;
+    const SessionResult got = run_session(scene, 4, kSteps, network, {}, log);
+    ASSERT_EQ(got.failure, "");
+    EXPECT_EQ(first_difference(expected, got.steps), "");
+    EXPECT_EQ(got.total.actions, 8u);
+  }
+}
+
 // A body is handed over while its old owner is ahead, and falls asleep close by: for a while the old owner has records
 // of its own and those it is told. (Once it then looked for the body where its own had been, and the session stood
 // still.)

@@ -1,0 +1,139 @@
+// Users at work on a running session, over DDS: what they do is answered, changes the future, and is the same on any
+// number of worlds when it is done again from a recording.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <thread>
+
+#include "tests/distributed/session.h"
+
+namespace soda::test {
+namespace {
+
+class Acting : public SessionTest {
+ protected:
+  // Starts a session that runs for `steps` in real time, and waits until it does.
+  std::unique_ptr<Program> start(const std::string& file, int worlds, int steps, std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments{"run",        file,
+                                       "--session",  session,
+                                       "--worlds",   std::to_string(worlds),
+                                       "--steps",    std::to_string(steps),
+                                       "--stats",    path("stats"),
+                                       "--hash-log", path("log"),
+                                       "-v"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    auto program = std::make_unique<Program>(soda(arguments), directory());
+    EXPECT_TRUE(program->wrote("the session starts", 60s)) << program->output();
+    return program;
+  }
+  std::string ask(std::vector<std::string> arguments, int exit_code = 0) const {
+    arguments.insert(arguments.end(), {"--session", session});
+    return run(arguments, exit_code, 30s);
+  }
+  static void expect_says(const std::string& output, const std::string& text) {
+    EXPECT_NE(output.find(text), std::string::npos) << output;
+  }
+  const std::string session = new_session();
+};
+
+TEST_F(Acting, WhatIsDoneLiveIsDoneAgainFromTheRecording) {
+  const std::string file = scene("city", 400);
+  auto running = start(file, 3, 1500, {"--record", path("run.rec")});
+  expect_says(ask({"act", "push", "17", "--impulse", "0", "0", "4000", "--point", "0.1", "0", "0"}),
+              "action 1, at step");
+  expect_says(ask({"act", "spawn", "--sphere", "0.3", "--at", "0", "0", "6"}), "body 402");  // 401 is the ground
+  expect_says(ask({"act", "pose", "20", "--position", "1", "2", "7"}), "action 3");
+  expect_says(ask({"act", "velocity", "402", "--linear", "5", "0", "3"}), "action 4");
+  expect_says(ask({"act", "grab", "40", "--target", "0", "0", "5"}), "action 5");
+  expect_says(ask({"act", "remove", "30"}), "action 6");
+  expect_says(ask({"act", "move", "5", "--target", "4", "0", "5"}), "action 7");
+  expect_says(ask({"act", "release", "5"}), "action 8");
+  // Refused with the reason, and nothing else happens.
+  expect_says(ask({"act", "push", "99999", "--impulse", "1", "0", "0"}, 1), "refused: there is no body 99999");
+  expect_says(ask({"act", "push", "30", "--impulse", "1", "0", "0"}, 1), "refused: body 30 is removed at step");
+  expect_says(ask({"act", "spawn", "--sphere", "-1", "--at", "0", "0", "6"}, 1), "spawn.body.shape[0].sphere.radius");
+  expect_says(ask({"act", "velocity", "1", "--linear", "1e9", "0", "0"}, 1), "the scene's largest speed");
+  ask({"speed", "max"});
+  expect_exit(*running, 0);
+  EXPECT_EQ(stat(path("stats"), "actions"), 8);
+  // They came for steps that had been computed: the future was changed.
+  EXPECT_GT(stat(path("stats"), "rollbacks"), 0);
+  EXPECT_GT(stat(path("stats"), "bodies_redone"), 0);
+  EXPECT_GT(stat(path("stats"), "anticipated"), 0);
+  EXPECT_EQ(stat(path("stats"), "refused"), 0);
+  for (const auto& way : std::vector<std::vector<std::string>>{
+           {"--sync", "single"}, {"--worlds", "2"}, {"--worlds", "5", "--sync", "conservative"}}) {
+    std::vector<std::string> arguments{"verify", path("run.rec"), "-q"};
+    arguments.insert(arguments.end(), way.begin(), way.end());
+    expect_says(run(arguments), "equal: 1501 steps");
+  }
+}
+
+TEST_F(Acting, ARecordingThatSaysOtherwiseIsNotVerified) {
+  const std::string file = scene("cubes", 60);
+  const std::string acts = actions(file, 80, 10, 2);
+  run({"run", file, "--sync", "single", "--steps", "90", "--pace", "max", "--actions", acts, "--record",
+       path("a.rec")});
+  expect_says(run({"verify", path("a.rec"), "--worlds", "2", "-q"}), "equal: 91 steps");
+  // Cut off, it is verified up to there, or refused.
+  const std::string whole = read_text(path("a.rec"));
+  std::ofstream(path("cut.rec"), std::ios::binary) << whole.substr(0, whole.size() - 3);
+  std::ofstream(path("short.rec"), std::ios::binary) << whole.substr(0, 100);
+  std::ofstream(path("other.rec"), std::ios::binary) << "something else, which is long enough";
+  expect_says(run({"verify", path("short.rec")}, 2), "is cut off before its first step");
+  expect_says(run({"verify", path("other.rec")}, 2), "is not a recording");
+}
+
+TEST_F(Acting, AKilledRunLeavesARecordingUpToASecondBefore) {
+  auto running = start(scene("cubes", 60), 2, 100000, {"--record", path("a.rec")});
+  std::this_thread::sleep_for(4s);  // of real time: 240 steps
+  expect_says(ask({"act", "push", "1", "--impulse", "0", "0", "50"}), "action 1");
+  std::this_thread::sleep_for(2s);
+  ASSERT_EQ(::kill(running->pid(), SIGKILL), 0);
+  expect_exit(*running, -SIGKILL);
+  const std::string said = run({"verify", path("a.rec"), "--worlds", "3", "-q"});
+  expect_says(said, "not whole: the run did not come to its end");
+  expect_says(said, "1 actions");
+  std::size_t steps = 0;
+  ASSERT_EQ(std::sscanf(said.substr(said.find("equal: ")).c_str(), "equal: %zu", &steps), 1) << said;
+  EXPECT_GT(steps, 240u);
+}
+
+TEST_F(Acting, PausedASessionWaitsAndGoesStepByStep) {
+  auto running = start(scene("cubes", 60), 2, 300);
+  const auto displayed = [&](const std::string& output) {
+    long long step = -1;
+    std::sscanf(output.substr(output.find("displayed step") + 14).c_str(), "%lld", &step);
+    return step;
+  };
+  ask({"pause"});
+  std::this_thread::sleep_for(300ms);
+  const long long at = displayed(ask({"pause"}));
+  std::this_thread::sleep_for(500ms);
+  EXPECT_EQ(displayed(ask({"pause"})), at) << "it went on";
+  ask({"step", "7"});
+  std::this_thread::sleep_for(500ms);
+  EXPECT_EQ(displayed(ask({"pause"})), at + 7);
+  expect_says(ask({"act", "push", "3", "--impulse", "0", "0", "9"}),
+              "at step " + std::to_string(at + 7 + 7));  // lead 6
+  ask({"speed", "4"});
+  ask({"resume"});
+  expect_says(ask({"step"}, 1), "single steps are for a paused session");
+  expect_exit(*running, 0, 60s);
+  EXPECT_EQ(lines_of(path("log")).size(), 301u);
+}
+
+TEST_F(Acting, NobodyThereIsSaid) {
+  expect_says(ask({"act", "remove", "1"}, 1), "nobody answers in session");
+  expect_says(run({"speed", "sometimes", "--session", session}, 2), "a pace is");
+  expect_says(run({"run", scene("cubes", 20), "--actions", path("nowhere")}, 2), "nowhere");
+  std::ofstream(path("bad.txtpb")) << "action { step: 4 push { body: 7777 impulse { z: 1 } } }\n";
+  expect_says(run({"run", scene("cubes", 20), "--actions", path("bad.txtpb")}, 2),
+              "bad.txtpb: action 1: there is no body 7777");
+}
+
+}  // namespace
+}  // namespace soda::test
