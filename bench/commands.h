@@ -5,7 +5,8 @@
 
 namespace soda::bench {
 
-void step(const Options& options, Headline& headline);    // our step against stock Bullet
-void worlds(const Options& options, Headline& headline);  // one world against two
+void step(const Options& options, Headline& headline);      // our step against stock Bullet
+void worlds(const Options& options, Headline& headline);    // one world against two
+void response(const Options& options, Headline& headline);  // from a push until it shows
 
 }  // namespace soda::bench

@@ -49,6 +49,8 @@ void plot(const Options& options, const std::string& name, const std::string& sc
   if (!written || pclose(gnuplot) != 0) std::cerr << "no picture " << name << ": gnuplot failed or is not installed\n";
 }
 
+std::filesystem::path soda_program() { return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "soda"; }
+
 double cpu_seconds() {
   timespec t;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);

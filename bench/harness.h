@@ -49,6 +49,9 @@ class Csv {
 void plot(const Options& options, const std::string& name, const std::string& script, int width = 800,
           int height = 500);
 
+// The command beside this program.
+std::filesystem::path soda_program();
+
 double cpu_seconds();  // of this thread
 double median(std::vector<double> values);
 

@@ -15,6 +15,7 @@ struct Command {
 constexpr Command kCommands[] = {
     {"step", "time and standing towers of our step against stock Bullet, side by side", soda::bench::step},
     {"worlds", "whole runs on one world and on two, over DDS", soda::bench::worlds},
+    {"response", "from a user's push until it shows, in real time, over DDS", soda::bench::response},
 };
 
 }  // namespace

@@ -36,9 +36,6 @@ struct Case {
 };
 constexpr Case kCases[] = {{"piles", 1728, 600}, {"city", 8000, 240}};
 
-// The program beside this one.
-std::filesystem::path soda_program() { return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "soda"; }
-
 double number_in(const std::filesystem::path& json, const std::string& key) {
   std::stringstream text;
   text << std::ifstream(json).rdbuf();

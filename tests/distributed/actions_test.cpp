@@ -118,12 +118,28 @@ TEST_F(Acting, PausedASessionWaitsAndGoesStepByStep) {
   std::this_thread::sleep_for(500ms);
   EXPECT_EQ(displayed(ask({"pause"})), at + 7);
   expect_says(ask({"act", "push", "3", "--impulse", "0", "0", "9"}),
-              "at step " + std::to_string(at + 7 + 7));  // lead 6
+              "at step " + std::to_string(at + 7 + 5));  // lead 4
   ask({"speed", "4"});
   ask({"resume"});
   expect_says(ask({"step"}, 1), "single steps are for a paused session");
   expect_exit(*running, 0, 60s);
   EXPECT_EQ(lines_of(path("log")).size(), 301u);
+}
+
+class AllLong : public SessionTest {};
+
+TEST_F(AllLong, MemoryStaysFlat) {
+  const std::string file = scene("cubes", 60);
+  const auto peak = [&](Step steps) {
+    run({"run", file, "--worlds", "2", "--steps", std::to_string(steps), "--pace", "max", "-q", "--actions",
+         actions(file, steps, 400, 5), "--stats", path("stats")},
+        0, 600s);
+    EXPECT_GT(stat(path("stats"), "actions"), 50);
+    EXPECT_GT(stat(path("stats"), "anticipated"), 0);
+    return stat(path("stats"), "peak_memory_bytes");
+  };
+  const double early = peak(20'000), late = peak(100'000);
+  EXPECT_LT(late, early * 1.1);
 }
 
 TEST_F(Acting, NobodyThereIsSaid) {
