@@ -13,8 +13,8 @@ namespace soda {
 constexpr Step kDefaultSteps = 600;  // 10 s at 60 Hz
 constexpr Step kDefaultWindow = 48;  // K, as in the paper: steps beyond the final one that a world may compute
 constexpr Step kLargestWindow = 4096;
-constexpr Step kDefaultLead =
-    6;  // input lead: an action of now is for this many steps after the displayed one, and one
+// Input lead: steps after the displayed one that are closed for actions; one of now is for the first that is open.
+constexpr Step kDefaultLead = 4;
 constexpr Step kLargestLead = 4096;
 
 // How worlds keep in step; the numbers go over the network (Session.sync).
