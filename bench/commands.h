@@ -5,7 +5,8 @@
 
 namespace soda::bench {
 
-void step(const Options& options, Headline& headline);    // our step against stock Bullet
-void worlds(const Options& options, Headline& headline);  // one world against two
+void step(const Options& options, Headline& headline);      // our step against stock Bullet
+void worlds(const Options& options, Headline& headline);    // one world against two
+void rollback(const Options& options, Headline& headline);  // repairing, computing ahead, and the window's memory
 
 }  // namespace soda::bench

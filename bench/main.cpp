@@ -15,6 +15,8 @@ struct Command {
 constexpr Command kCommands[] = {
     {"step", "time and standing towers of our step against stock Bullet, side by side", soda::bench::step},
     {"worlds", "whole runs on one world and on two, over DDS", soda::bench::worlds},
+    {"rollback", "repairs against computing all again; computing ahead; what the window takes of memory",
+     soda::bench::rollback},
 };
 
 }  // namespace
