@@ -135,11 +135,17 @@ void measure_repair(const Options& options, Headline& headline) {
 struct Pair {
   double cpu = 0;  // s
   std::uint64_t anticipated = 0, computed = 0;
+  double depth = 0;  // steps kept beyond the final one, mean over turns and worlds
 };
 
-// Two worlds take turns; what one says in a turn the other hears in its next, or `delay` turns later.
-Pair run_pair(const Scene& scene, const TerritoryMap& map, border::Sync sync, Step steps, int delay) {
-  constexpr int kWorks = 8;  // in a turn: four steps
+struct Turns {
+  const char *key, *what;
+  int works;  // calls of work() in a turn, two for a step
+  int delay;  // turns until what is said is heard, beside those that pass anyway
+};
+
+// Two worlds take turns; what one says in a turn the other hears in its next, or later.
+Pair run_pair(const Scene& scene, const TerritoryMap& map, border::Sync sync, Step steps, const Turns& turns) {
   std::array<std::optional<LoneCore>, 2> worlds;
   for (WorldId w = 0; w < 2; ++w)
     worlds[w].emplace(scene, map, border::CoreSettings{.me = w, .last_step = steps, .sync = sync, .window = kWindow});
@@ -148,21 +154,25 @@ Pair run_pair(const Scene& scene, const TerritoryMap& map, border::Sync sync, St
     std::vector<std::byte> bytes;
   };
   std::array<std::deque<Flight>, 2> flights;
+  Pair result;
+  int turn = 0;
   const double start = cpu_seconds();
-  for (int turn = 0, done = 0; done < 2 || !flights[0].empty() || !flights[1].empty(); ++turn) {
+  for (int done = 0; done < 2 || !flights[0].empty() || !flights[1].empty(); ++turn) {
     done = 0;
     for (WorldId w = 0; w < 2; ++w) {
       border::WorldCore& core = **worlds[w];
       for (; !flights[w].empty() && flights[w].front().turn <= turn; flights[w].pop_front())
         if (!core.receive(flights[w].front().bytes)) throw std::runtime_error(core.last_refusal());
       auto progress = border::Progress::kWorked;
-      for (int i = 0; i < kWorks && progress == border::Progress::kWorked; ++i) progress = core.work();
+      for (int i = 0; i < turns.works && progress == border::Progress::kWorked; ++i) progress = core.work();
       done += progress == border::Progress::kDone;
+      result.depth += static_cast<double>(core.clock() - core.final_step());
       for (border::Outgoing& out : core.take_outgoing())
-        flights[out.to].push_back({turn + delay, std::move(out.bytes)});
+        flights[out.to].push_back({turn + turns.delay, std::move(out.bytes)});
     }
   }
-  Pair result{.cpu = cpu_seconds() - start};
+  result.cpu = cpu_seconds() - start;
+  result.depth /= 2 * turn;
   for (auto& world : worlds) {
     const border::CoreStats& stats = (*world)->stats();
     require(stats.mixed_islands == 0 && stats.frame_bodies_sent == 0, "the worlds have to do with each other");
@@ -180,23 +190,22 @@ void measure_anticipation(const Options& options, Headline& headline) {
   Scene scene = generate("piles", 972, 1);
   scene.sleeping = false;
   const TerritoryMap map = bisect(scene, make_grid(scene), 2);
-  struct Case {
-    const char *key, *what;
-    int delay;
-  };
-  // A turn is four steps: twelve of them fill the window.
-  constexpr Case kCases[] = {{"", "messages at once", 0}, {".window_full", "messages 12 turns late", 12}};
-  Csv table(options, "rollback_anticipation", "delay_turns,conservative_s,anticipative_s,overhead,anticipated_steps");
-  for (const Case& c : kCases) {
+  // A final step takes an exchange of messages. So with several steps in a turn the window fills.
+  constexpr Turns kCases[] = {{".two_steps", "two steps in a turn", 4, 0},
+                              {"", "four steps in a turn", 8, 0},
+                              {".window_full", "four steps in a turn, messages 12 turns late", 8, 12}};
+  Csv table(options, "rollback_anticipation",
+            "works_in_turn,delay_turns,conservative_s,anticipative_s,overhead,anticipated_share,depth");
+  for (const Turns& c : kCases) {
     std::vector<double> conservative, anticipative, overhead;
     Pair ahead;
     for (int round = 0; round < rounds; ++round) {
       Pair behind;
       for (int turn = 0; turn < 2; ++turn) {
         if ((turn == 0) == (round % 2 == 0))
-          behind = run_pair(scene, map, border::Sync::kConservative, steps, c.delay);
+          behind = run_pair(scene, map, border::Sync::kConservative, steps, c);
         else
-          ahead = run_pair(scene, map, border::Sync::kAnticipative, steps, c.delay);
+          ahead = run_pair(scene, map, border::Sync::kAnticipative, steps, c);
       }
       require(ahead.computed == behind.computed, "the two modes did not do the same work");
       conservative.push_back(behind.cpu);
@@ -204,12 +213,13 @@ void measure_anticipation(const Options& options, Headline& headline) {
       overhead.push_back(ahead.cpu / behind.cpu - 1);
     }
     require(ahead.anticipated > 0, "nothing was computed ahead");
-    const double percent = 100.0 * static_cast<double>(ahead.anticipated) / static_cast<double>(2 * steps);
-    std::printf("computing ahead, %s: %.1f %% of the steps ahead, %.3f s against %.3f s, overhead %+.1f %%\n", c.what,
-                percent, median(anticipative), median(conservative), 100 * median(overhead));
-    table.row(c.delay, median(conservative), median(anticipative), median(overhead), ahead.anticipated);
+    const double share = static_cast<double>(ahead.anticipated) / static_cast<double>(2 * steps);
+    std::printf("ahead, %s: %.0f %% of the steps, %.1f steps kept; %.3f s against %.3f s, overhead %+.1f %%\n", c.what,
+                100 * share, ahead.depth, median(anticipative), median(conservative), 100 * median(overhead));
+    table.row(c.works, c.delay, median(conservative), median(anticipative), median(overhead), share, ahead.depth);
     headline.add(std::string("anticipation_overhead") + c.key, median(overhead));
-    headline.add(std::string("anticipated_share") + c.key, percent / 100);
+    headline.add(std::string("anticipated_share") + c.key, share);
+    headline.add(std::string("steps_kept") + c.key, ahead.depth);
   }
 }
 
