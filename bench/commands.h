@@ -8,5 +8,6 @@ namespace soda::bench {
 void step(const Options& options, Headline& headline);      // our step against stock Bullet
 void worlds(const Options& options, Headline& headline);    // one world against two
 void rollback(const Options& options, Headline& headline);  // repairing, computing ahead, and the window's memory
+void latency(const Options& options, Headline& headline);   // what users notice
 
 }  // namespace soda::bench

@@ -17,6 +17,8 @@ constexpr Command kCommands[] = {
     {"worlds", "whole runs on one world and on two, over DDS", soda::bench::worlds},
     {"rollback", "repairs against computing all again; computing ahead; what the window takes of memory",
      soda::bench::rollback},
+    {"latency", "a push in a city, and frames missed while first one world is slow and then the other",
+     soda::bench::latency},
 };
 
 }  // namespace
