@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "bench/commands.h"
+#include "bench/load_peaks.h"
 #include "bench/lone_core.h"
 #include "common/scene/generators.h"
 
@@ -78,6 +79,9 @@ void measure_pushes(const Options& options, Headline& headline) {
 
 }  // namespace
 
-void latency(const Options& options, Headline& headline) { measure_pushes(options, headline); }
+void latency(const Options& options, Headline& headline) {
+  measure_pushes(options, headline);
+  load_peaks(options, headline);
+}
 
 }  // namespace soda::bench
