@@ -12,7 +12,7 @@
 namespace soda::bench {
 namespace {
 
-// The second person's walk is disturbed by the first's push, and so on: these are the pushes' numbers.
+// By push.
 struct Pushes {
   std::vector<double> ms, step_ms, over_step, redone;
 };
