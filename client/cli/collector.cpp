@@ -175,6 +175,10 @@ bool Collector::complete() const {
                      [](const wire::Status& status) { return status.state() == wire::STATE_DONE; });
 }
 
+void Collector::tick() {
+  if (recorder_) recorder_->tick();
+}
+
 void Collector::close() {
   if (log_) log_->close();
   if (dump_) dump_->close();

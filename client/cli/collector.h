@@ -56,6 +56,7 @@ class Collector {
   bool complete() const;
   // "step 17: ..." for the first step that is not as expected, or "".
   const std::string& difference() const { return difference_; }
+  void tick();  // now and then, also where nothing is heard
   // Completes the files with what has been heard.
   void close();
 

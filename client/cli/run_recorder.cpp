@@ -12,6 +12,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, std::string encoded_
 
 void RunRecorder::take(const wire::Session& session) {
   worlds_ = session.worlds();
+  pose_every_ = session.pose_every();
   pb::RecordedSettings settings;
   settings.set_version(session.version());
   settings.set_scene_name(session.scene_name());
@@ -56,6 +57,11 @@ void RunRecorder::take(const wire::Poses& poses) {
   write();
 }
 
+bool RunRecorder::has(Step last_step) const {
+  const bool poses = pose_every_ == 0 || posed_ == last_step - last_step % pose_every_;
+  return digests_.empty() && next_step_ > last_step && poses_.empty() && poses;
+}
+
 void RunRecorder::digest(Step step, const StepDigest& digest) {
   digests_.push_back(digest);
   next_step_ = step + 1;
@@ -79,6 +85,7 @@ void RunRecorder::write() {
                        std::all_of(sample.missing.begin(), sample.missing.end(), [](auto n) { return n == 0; });
     if (!whole) break;
     sample.poses.set_step(first->first);
+    posed_ = first->first;
     writer_.add_poses(std::move(sample.poses));
   }
   writer_.flush_if_due();

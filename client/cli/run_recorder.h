@@ -26,7 +26,9 @@ class RunRecorder {
   void take(const wire::Poses& poses);
   void digest(Step step, const StepDigest& digest);  // of all worlds together, in order
   // All up to that step is in the file, or on its way there.
-  bool has(Step last_step) const { return digests_.empty() && next_step_ > last_step && poses_.empty(); }
+  bool has(Step last_step) const;
+  // Writes to the file what has been gathered for some time, also where nothing new comes.
+  void tick() { writer_.flush_if_due(); }
   void close(bool complete);
 
  private:
@@ -47,6 +49,7 @@ class RunRecorder {
   std::deque<StepDigest> digests_;
   Step next_step_ = 0;  // of the next digest
   std::map<Step, Sample> poses_;
+  Step pose_every_ = 0, posed_ = -1;  // step of the last poses written
 };
 
 }  // namespace soda::cli

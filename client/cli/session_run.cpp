@@ -31,6 +31,7 @@ class Follower {
     auto last_end = Clock::now();
     for (;;) {
       hear();
+      collector_.tick();
       if (!collector_.difference().empty()) return kExitDifferent;
       if (collector_.complete()) return let_end();
       if (signals_.received() != 0) return 128 + signals_.received();

@@ -1,6 +1,7 @@
 #include "client/cli/verify_command.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -22,7 +23,7 @@ struct VerifyOptions : LaunchOptions {
 int verify(VerifyOptions& options) {
   Recording recording = load_recording(options.recording, false);
   const pb::RecordedSettings& settings = recording.settings;
-  if (!options.worlds_given) options.worlds = options.single() ? 1 : std::max(1u, settings.worlds());
+  if (!options.worlds_given) options.worlds = options.single() ? 1 : std::clamp(settings.worlds(), 1u, dds::kMaxWorlds);
   options.pace = "max";
   options.steps = static_cast<Step>(recording.digests.size()) - 1;
   check(options);

@@ -15,6 +15,9 @@ namespace soda {
 // Number of an action in a session's log, from 1 on.
 using ActionNumber = std::uint64_t;
 
+constexpr Step kMaxActionStep = Step{1} << 40;                 // as of sessions
+constexpr std::size_t kMaxActionBytes = std::size_t{4} << 20;  // of an encoded action
+
 struct Push {
   BodyId body = 0;
   Vec3 impulse = Vec3::Zero();  // N s, world axes

@@ -20,80 +20,85 @@ ActionLog::ActionLog(const Scene& scene)
       largest_radius_(largest_later_radius(scene, make_grid(scene))),
       next_id_(scene.bodies.empty() ? 1 : scene.bodies.back().id + 1) {}
 
-std::string ActionLog::body_problem(BodyId id) const {
+std::string ActionLog::body_problem(BodyId id, Step step) const {
   const std::string name = "body " + std::to_string(id);
-  if (const auto known = known_.find(id); known != known_.end())
-    return known->second.removed ? name + " is removed at step " + std::to_string(known->second.since) : "";
+  bool spawned = false;
+  if (const auto turns = turns_.find(id); turns != turns_.end())
+    for (const Turn& turn : turns->second) {
+      spawned = spawned || turn.kind == Turn::Kind::kSpawned;
+      if (turn.kind == Turn::Kind::kRemoved && step > turn.step)
+        return name + " is removed at step " + std::to_string(turn.step + 1);
+    }
+  if (spawned) return "";
   const auto at = std::lower_bound(scene_.bodies.begin(), scene_.bodies.end(), id,
                                    [](const Body& b, BodyId wanted) { return b.id < wanted; });
   if (at == scene_.bodies.end() || at->id != id) return "there is no " + name;
   return at->is_static ? name + " is static" : "";
 }
 
-const Grab* ActionLog::open_grab(ActionNumber number) const {
-  const auto grab = grabs_.find(number);
-  return grab == grabs_.end() ? nullptr : &grab->second;
-}
-
-std::string ActionLog::problem(const Action& action, Step step) const {
+std::string ActionLog::problem(const LoggedAction& entry) const {
   const auto on_grab = [&](ActionNumber number) -> std::string {
-    if (!open_grab(number)) return "number " + std::to_string(number) + " is not a grab that lasts";
-    if (step < grab_steps_.at(number))
-      return "step " + std::to_string(step) + " is before what was said of grab " + std::to_string(number) + " last";
+    const auto grab = grabs_.find(number);
+    if (grab == grabs_.end()) return "number " + std::to_string(number) + " is not a grab that lasts";
+    if (entry.step < grab->second.step)
+      return "step " + std::to_string(entry.step) + " is before what was said of grab " + std::to_string(number) +
+             " last";
     return "";
   };
-  return std::visit(Overloaded{
-                        [&](const Push& a) { return body_problem(a.body); },
-                        [&](const SetVelocity& a) { return body_problem(a.body); },
-                        [&](const SetPose& a) { return body_problem(a.body); },
-                        [&](const Grab& a) { return body_problem(a.body); },
-                        [&](const Remove& a) { return body_problem(a.body); },
-                        [&](const MoveGrab& a) { return on_grab(a.grab); },
-                        [&](const Release& a) { return on_grab(a.grab); },
-                        [&](const Spawn& a) -> std::string {
-                          if (next_id_ > kMaxBodyId) return "there is no id left for a new body";
-                          const Body& body = a.body->bodies.front();
-                          const double radius = bounding_radius(*a.body, body);
-                          if (radius > largest_radius_)
-                            return "its bounding radius is " + std::to_string(radius) + " m; in this scene it may be " +
-                                   std::to_string(largest_radius_) + " m (territories depend on it)";
-                          return "";
-                        },
-                    },
-                    action);
+  if (entry.step > kMaxActionStep) return "step " + std::to_string(entry.step) + " is beyond all sessions";
+  const std::string reason =
+      std::visit(Overloaded{
+                     [&](const MoveGrab& a) { return on_grab(a.grab); },
+                     [&](const Release& a) { return on_grab(a.grab); },
+                     [&](const Spawn& a) -> std::string {
+                       if (next_id_ > kMaxBodyId) return "there is no id left for a new body";
+                       const Body& body = a.body->bodies.front();
+                       const double radius = bounding_radius(*a.body, body);
+                       if (radius > largest_radius_)
+                         return "its bounding radius is " + std::to_string(radius) + " m; in this scene it may be " +
+                                std::to_string(largest_radius_) + " m (territories depend on it)";
+                       return "";
+                     },
+                     [&](const auto& a) { return body_problem(a.body, entry.step); },
+                 },
+                 entry.action);
+  if (!reason.empty()) return reason;
+  if (const std::size_t size = encode_action(entry).size(); size > kMaxActionBytes)
+    return "it takes " + std::to_string(size) + " bytes; an action may take " + std::to_string(kMaxActionBytes);
+  return "";
 }
 
-// What is said of a body comes no earlier than what gave it its present state.
-Step ActionLog::earliest(const Action& action) const {
-  const auto since = [&](BodyId id) {
-    const auto known = known_.find(id);
-    return known == known_.end() ? Step{1} : known->second.since;
-  };
-  return std::visit(Overloaded{
-                        [&](const Spawn&) { return Step{1}; },
-                        [&](const MoveGrab&) { return Step{1}; },
-                        [&](const Release&) { return Step{1}; },
-                        [&](const auto& a) { return since(a.body); },
-                    },
-                    action);
+Step ActionLog::not_before(BodyId id, Step step) const {
+  const auto turns = turns_.find(id);
+  if (turns == turns_.end()) return step;
+  for (bool moved = true; moved;) {
+    const Step before = step;
+    for (const Turn& turn : turns->second) {
+      if (turn.kind == Turn::Kind::kSpawned) step = std::max(step, turn.step);
+      if (turn.kind != Turn::Kind::kSpawned && step == turn.step) ++step;
+    }
+    moved = step != before;
+  }
+  return step;
 }
 
 void ActionLog::note(const LoggedAction& entry) {
   std::visit(Overloaded{
-                 [&](const SetPose& a) { known_[a.body].since = entry.step + 1; },
+                 [&](const SetPose& a) {
+                   turns_[a.body].push_back({Turn::Kind::kMoved, entry.step});
+                 },
                  [&](const Remove& a) {
-                   known_[a.body] = {entry.step + 1, true};
+                   turns_[a.body].push_back({Turn::Kind::kRemoved, entry.step});
+                   std::erase_if(grabs_, [&](const auto& grab) { return grab.second.body == a.body; });
                  },
-                 [&](const Spawn& a) { known_[a.body->bodies.front().id].since = entry.step; },
+                 [&](const Spawn& a) {
+                   turns_[a.body->bodies.front().id].push_back({Turn::Kind::kSpawned, entry.step});
+                 },
                  [&](const Grab& a) {
-                   grabs_[entry.number] = a;
-                   grab_steps_[entry.number] = entry.step;
+                   grabs_[entry.number] = {a.body, entry.step};
                  },
-                 [&](const MoveGrab& a) { grab_steps_[a.grab] = entry.step; },
-                 [&](const Release& a) {
-                   grabs_.erase(a.grab);
-                   grab_steps_.erase(a.grab);
-                 },
+                 [&](const MoveGrab& a) { grabs_[a.grab].step = entry.step; },
+                 [&](const Release& a) { grabs_.erase(a.grab); },
                  [](const auto&) {},
              },
              entry.action);
@@ -102,9 +107,12 @@ void ActionLog::note(const LoggedAction& entry) {
 std::variant<LoggedAction, ActionLog::Refused> ActionLog::add(WantedAction wanted, Step first_open) {
   LoggedAction entry;
   entry.number = entries_.size() + 1;
-  entry.step = std::max({first_open, wanted.step.value_or(first_open), earliest(wanted.action)});
+  entry.step = std::max(first_open, wanted.step.value_or(first_open));
   entry.action = std::move(wanted.action);
-  if (const std::string reason = problem(entry.action, entry.step); !reason.empty()) return Refused{reason};
+  std::visit(Overloaded{[](const Spawn&) {}, [](const MoveGrab&) {}, [](const Release&) {},
+                        [&](const auto& a) { entry.step = not_before(a.body, entry.step); }},
+             entry.action);
+  if (const std::string reason = problem(entry); !reason.empty()) return Refused{reason};
   if (auto* spawn = std::get_if<Spawn>(&entry.action)) {
     if (wanted.id && *wanted.id != next_id_)
       return Refused{"it asks for id " + std::to_string(*wanted.id) + "; the next new body's is " +

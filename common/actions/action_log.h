@@ -23,29 +23,33 @@ class ActionLog {
     std::string reason;
   };
   // The action is the log's newest if it is accepted. `first_open`: no step before it may be changed any more; an
-  // action that wants an earlier one, or says nothing, gets this one. A body that is moved or removed has its new state
-  // one step later: what is done to it afterwards comes no earlier than that.
+  // action that wants an earlier one, or says nothing, gets this one. Where a body is moved or removed at that very
+  // step, or spawned later, it gets the first at which the body has its new state.
   std::variant<LoggedAction, Refused> add(WantedAction wanted, Step first_open);
 
   const std::vector<LoggedAction>& entries() const { return entries_; }  // entries()[n - 1] is number n
 
  private:
-  struct Known {
-    Step since = 0;  // its state is given by the scene, or by an action, at this step
-    bool removed = false;
+  // A body is given another state, or none any more.
+  struct Turn {
+    enum class Kind { kSpawned, kMoved, kRemoved };
+    Kind kind;
+    Step step;  // of the action; a move or removal takes effect one step later
   };
-  std::string problem(const Action& action, Step step) const;
-  std::string body_problem(BodyId id) const;
-  const Grab* open_grab(ActionNumber number) const;
-  Step earliest(const Action& action) const;
+  struct OpenGrab {
+    BodyId body = 0;
+    Step step = 0;  // of the last word about it
+  };
+  std::string problem(const LoggedAction& entry) const;
+  std::string body_problem(BodyId id, Step step) const;
+  Step not_before(BodyId id, Step step) const;
   void note(const LoggedAction& entry);
 
   const Scene& scene_;
   double largest_radius_;
   BodyId next_id_;
-  std::unordered_map<BodyId, Known> known_;  // bodies that are not just as in the scene
-  std::map<ActionNumber, Grab> grabs_;       // open ones
-  std::map<ActionNumber, Step> grab_steps_;  // of those: the step of the last word about each
+  std::unordered_map<BodyId, std::vector<Turn>> turns_;
+  std::map<ActionNumber, OpenGrab> grabs_;
   std::vector<LoggedAction> entries_;
 };
 

@@ -20,7 +20,6 @@ namespace {
 namespace gp = google::protobuf;
 
 constexpr double kMaxImpulse = 1e12;                         // N s
-constexpr Step kMaxActionStep = Step{1} << 40;               // as of sessions
 constexpr double kMinFrequency = 1e-3, kMaxFrequency = 1e3;  // Hz
 constexpr double kMaxDampingRatio = 100;
 
@@ -187,7 +186,7 @@ WantedAction from_proto(const pb::Action& message, const Scene& scene) {
   }
   if (message.spawn().body().has_id()) wanted.id = message.spawn().body().id();
   if (message.when_case() == pb::Action::kStep) {
-    if (message.step() < 1 || message.step() > kMaxActionStep) throw ActionError("step: must be 1 or later");
+    if (message.step() < 1 || message.step() > kMaxActionStep) throw ActionError("step: must be between 1 and 2^40");
     wanted.step = message.step();
   } else if (message.when_case() == pb::Action::kTime) {
     const double steps = std::ceil(message.time() / scene.dt * (1 - 1e-12));

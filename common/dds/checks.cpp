@@ -6,6 +6,7 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "common/actions/action.h"
 #include "common/body_state.h"
 #include "common/contact_record.h"
 #include "common/run_settings.h"

@@ -22,7 +22,6 @@ constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 32;
 constexpr std::size_t kMaxPoses = 16384;    // in one sample
 constexpr std::size_t kMaxDigests = 65536;  // steps in one sample
 constexpr std::size_t kMaxText = 1024;      // bytes of any string
-constexpr std::size_t kMaxActionBytes = 4 * 1024 * 1024;
 
 // Whether the lengths of the sample's sequences fit into what follows them. Run before the sample is taken apart,
 // because Fast CDR allocates what a length says before it looks for the elements. True for types without sequences.

@@ -52,9 +52,11 @@ class WorldCore::Impl final : timeline::Arbiter {
 
   // It may be of bodies that are not known here yet. What is lost for want of room is asked for again.
   bool hold_back(std::span<const std::byte> bytes) {
-    constexpr std::size_t kAtMost = 4096;
+    constexpr std::size_t kAtMost = 4096, kBytesAtMost = std::size_t{256} << 20;
     ++stats_.held_back;
-    if (held_back_.size() < kAtMost) held_back_.emplace_back(bytes.begin(), bytes.end());
+    if (held_back_.size() >= kAtMost || held_bytes_ + bytes.size() > kBytesAtMost) return true;
+    held_back_.emplace_back(bytes.begin(), bytes.end());
+    held_bytes_ += bytes.size();
     return true;
   }
 
@@ -107,12 +109,14 @@ class WorldCore::Impl final : timeline::Arbiter {
     deferred_.clear();
     changed();
     close();
-    for (const auto& bytes : std::exchange(held_back_, {})) (void)receive(bytes);
+    held_bytes_ = 0;
+    for (const auto& bytes : std::exchange(held_back_, {})) (void)receive(bytes);  // refusals are counted
     return true;
   }
 
   void close_actions(Step step, ActionNumber logged) {
-    closings_.emplace_back(step, logged);
+    if (closings_.empty() || closings_.back().second != logged) closings_.emplace_back(0, logged);
+    closings_.back().first = std::max(closings_.back().first, step);
     close();
   }
 
@@ -138,6 +142,8 @@ class WorldCore::Impl final : timeline::Arbiter {
     idle_ = !worked && !more_final;
     if (worked || more_final) return Progress::kWorked;
     if (final_ == settings_.last_step && context_.near_final(final_)) return Progress::kDone;
+    // Whoever lacks something from others must say so, wherever the clock may go.
+    if (final_ < std::min(timeline_.newest(), closed_)) return Progress::kWaiting;
     const bool limited = timeline_.newest() >= limit_ && limit_ < settings_.last_step;
     return limited || (final_ >= closed_ && final_ < settings_.last_step) ? Progress::kAtLimit : Progress::kWaiting;
   }
@@ -228,10 +234,12 @@ class WorldCore::Impl final : timeline::Arbiter {
       const std::uint64_t resent = link.resent();
       link.collect(messages);
       stats_.messages_resent += link.resent() - resent;
-      // News of what is final alone are worth a message only when there is nothing else to do: else the next one
-      // carries them.
-      const bool final_news = link.told_final() != final_ || link.told_near_final() != near_final_;
-      if (link.has_content() || link.told_upto() != front() || (waiting && final_news))
+      // The next message carries news of what is final. They are worth one of their own where there will be none soon,
+      // or where this world is so far ahead of what is final that such news are what everybody waits for.
+      constexpr Step kFarAhead = 4;
+      const bool final_news = (waiting || timeline_.newest() > final_ + kFarAhead) &&
+                              (link.told_final() != final_ || link.told_near_final() != near_final_);
+      if (link.has_content() || link.told_upto() != front() || final_news)
         link.send(front(), final_, near_final_, logged_, messages);
       for (auto& bytes : messages) {
         ++stats_.messages_sent;
@@ -406,7 +414,8 @@ class WorldCore::Impl final : timeline::Arbiter {
   ActionNumber logged_ = 0;
   Step closed_;                                          // no action comes for steps up to this one
   std::vector<std::pair<Step, ActionNumber>> closings_;  // that presuppose entries of the log which have not come yet
-  std::vector<std::vector<std::byte>> held_back_;        // messages, likewise
+  std::size_t held_bytes_ = 0;
+  std::vector<std::vector<std::byte>> held_back_;  // messages, likewise
   bool begun_ = false;
   std::map<Step, std::size_t> deferred_;  // steps that were not worth doing, with so many pending bodies
   bool idle_ = false;                     // nothing can be done before something comes

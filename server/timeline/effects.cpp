@@ -45,6 +45,8 @@ std::vector<Effects::Change> Effects::add(const LoggedAction& entry) {
                  [&](const Remove& a) {
                    put(entry.step, a.body, Wake{});
                    put(entry.step + 1, a.body, Given{});
+                   for (Held& h : held_)
+                     if (h.slot == slot_of(a.body)) h.end = std::min(h.end, entry.step + 1);
                  },
                  [&](const Spawn& a) {
                    const Body& body = a.body->bodies.front();

@@ -60,6 +60,13 @@ void SpatialIndex::not_beside(Slot slot) {
     if (s.last == kStill) s.last = newest_;
 }
 
+void SpatialIndex::note_gone(Slot slot) {
+  not_beside(slot);
+  if (slot >= now_.size() || now_[slot] == kNowhere) return;
+  earlier_[slot].push_back({now_[slot], newest_});
+  now_[slot] = kNowhere;
+}
+
 void SpatialIndex::query(const Aabb& box, std::vector<Slot>& out) const {
   const auto visit = [&](Key key) {
     const auto cell = cells_.find(key);

@@ -35,6 +35,9 @@ class SpatialIndex {
   // From the newest step on the body has a state where it is noted now, and nowhere else.
   void not_beside(Slot slot);
 
+  // The body has no state from the newest step on, until it is noted again.
+  void note_gone(Slot slot);
+
   // Appends every body that may have a state whose box overlaps `box`; some twice.
   void query(const Aabb& box, std::vector<Slot>& out) const;
 

@@ -139,10 +139,8 @@ void Timeline::assume(std::size_t source, Step step) {
 }
 
 void Timeline::extend() {
-  Entry next = entries_.back();
-  next.pending.clear();
-  next.changed.clear();
-  next.raw.clear();
+  const Entry& last = entries_.back();
+  Entry next{last.produced, last.islands, last.heard, {}, {}, last.departed, {}, last.count, last.hash};
   entries_.push_back(std::move(next));
   ++stats_.steps;
   for (std::size_t source = 0; source < told_.size(); ++source) {
@@ -225,7 +223,8 @@ Ref<Record> Timeline::after_actions(Step step, Slot slot, const Record* raw) con
   if (!given && raw) state = raw->body;
   if (!state || (given && arbiter_.place(*state).owner != me_)) return {};
   effects_.apply(step, slot, *state);
-  return make_record(*state, given ? std::span<const ContactRecord>() : raw->contacts(), arbiter_.place(*state), step);
+  if (given) return make_record(*state, {}, arbiter_.place(*state), step);
+  return make_record(*state, raw->contacts(), arbiter_.place(*state), raw->computed);
 }
 
 // Does what is done to a body at a step again, with the result that is known.
@@ -234,8 +233,12 @@ void Timeline::do_actions(Step step, Slot slot) {
   const Record* const before = entry.produced.get(slot);
   const auto kept = entry.raw.find(slot);
   const Ref<Record> raw = kept != entry.raw.end() ? kept->second : Ref<Record>(entry.produced.get(slot));
-  if (raw) entry.raw.insert_or_assign(slot, raw);
   Ref<Record> now = after_actions(step, slot, raw.get());
+  // Where nothing is done any more (a grab was released), the result is the record, and is not kept beside it.
+  if (!effects_.acts_on(step, slot))
+    entry.raw.erase(slot);
+  else if (raw)
+    entry.raw.insert_or_assign(slot, raw);
   if (before && now && same(*before, *now)) return;
   if (now) {
     results_.clear();
@@ -258,11 +261,8 @@ void Timeline::set_departed(Entry& entry, Slot slot, bool departed) {
 // A body that is not own at a step has no result here, but where an action gives it one.
 void Timeline::take_away(Step step, Slot slot) {
   std::optional<BodyState> given;
-  if (effects_.acts_on(step + 1, slot)) {
-    at(step + 1).raw.erase(slot);
-    if (effects_.gives(step + 1, slot, given)) return;
-  }
-  drop(step + 1, slot);
+  at(step + 1).raw.erase(slot);
+  if (!effects_.gives(step + 1, slot, given)) drop(step + 1, slot);
 }
 
 void Timeline::drop(Step step, Slot slot) {
@@ -276,10 +276,12 @@ void Timeline::drop(Step step, Slot slot) {
   entry.pending.push_back(slot);
   entry.changed.push_back(slot);
   if (index_.is_beside(slot)) note_newest(slot);
+  if (!known(newest(), slot)) index_.note_gone(slot);
 }
 
 void Timeline::settle(Step step, const BodySet& results) {
   results_.clear();
+  acting_ = effects_.acted_on(step + 1);
   std::span<const ContactRecord> rest(results.contacts);
   for (const BodyState& body : results.bodies)
     take_result(step + 1, slot_of(body.id), body, take_contacts(rest, body.id));
@@ -289,7 +291,8 @@ void Timeline::settle(Step step, const BodySet& results) {
 // The result of an own body for `step`; one that is there already changes nothing.
 void Timeline::take_result(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts) {
   ++stats_.bodies_computed;
-  if (effects_.acts_on(step, slot)) return take_acted(step, slot, body, contacts);
+  if (!acting_.empty() && std::binary_search(acting_.begin(), acting_.end(), slot))
+    return take_acted(step, slot, body, contacts);
   const Record* const old = at(step).produced.get(slot);
   if (old && same(*old, body, contacts))
     note_repaired(slot, body, step);  // healed, or at rest
@@ -308,6 +311,8 @@ void Timeline::take_acted(Step step, Slot slot, const BodyState& body, std::span
     drop(step, slot);
   else if (!before || !same(*before, *now))
     results_.emplace_back(slot, std::move(now));
+  else if (!same(*raw, *now))
+    entry.pending.push_back(slot);  // the step leads elsewhere from here, though this is what was here already
 }
 
 // New records of bodies produced at `step`, ascending by slot.

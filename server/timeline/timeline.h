@@ -224,6 +224,7 @@ class Timeline {
   std::vector<std::uint8_t> has_result_;  // by position in bodies_
   std::vector<Aabb> boxes_;
   std::vector<Table<Record>::Item> results_;
+  std::vector<Slot> acting_;  // bodies that something is done to at the step of the results, ascending
   std::vector<std::pair<Slot, const Record*>> stored_;
   std::vector<Table<Island>::Item> island_items_;
 };

@@ -232,6 +232,7 @@ void Timeline::finish() {
   const Step step = std::exchange(unfinished_, -1);
   stepper_.solve(bodies_, contacts_, ends_, islands_, solved_);
   results_.clear();
+  acting_ = effects_.acted_on(step + 1);
   std::span<const ContactRecord> rest(contacts_.data(), own_contacts_);
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const auto contacts = take_contacts(rest, bodies_[i].id);

@@ -46,7 +46,9 @@ wire::Answer ActionDesk::answer(const wire::Request& request, const std::string&
 wire::Answer ActionDesk::act(const wire::Request& request, Step first_open) {
   try {
     const std::string_view bytes(reinterpret_cast<const char*>(request.action().data()), request.action().size());
-    const auto result = log_.add(decode_action(bytes, *scene_), first_open);
+    WantedAction wanted = decode_action(bytes, *scene_);
+    wanted.step.reset();  // one that has been waited for would bind a body until then
+    const auto result = log_.add(std::move(wanted), first_open);
     if (const auto* refused = std::get_if<ActionLog::Refused>(&result)) return answer(request, refused->reason, 0);
     const auto& action = std::get<LoggedAction>(result);
     append(action);

@@ -97,11 +97,21 @@ void Daemon::close_actions(Step step, ActionNumber logged) {
 
 // Hands the core what is next in the log.
 void Daemon::act_all() {
-  const std::lock_guard lock(actions_mutex_);
-  if (!std::exchange(actions_came_, false)) return;
-  actions_.erase(actions_.begin(), actions_.upper_bound(core_->logged()));  // told again
-  while (!actions_.empty() && core_->act(actions_.begin()->second)) actions_.erase(actions_.begin());
-  core_->close_actions(closed_, closed_logged_);
+  std::vector<LoggedAction> next;
+  Step closed = 0;
+  ActionNumber logged = 0;
+  {
+    const std::lock_guard lock(actions_mutex_);  // not while the core works: it may wait for a reader of reports
+    if (!std::exchange(actions_came_, false)) return;
+    actions_.erase(actions_.begin(), actions_.upper_bound(core_->logged()));  // told again
+    for (ActionNumber number = core_->logged() + 1; !actions_.empty() && actions_.begin()->first == number; ++number) {
+      next.push_back(std::move(actions_.begin()->second));
+      actions_.erase(actions_.begin());
+    }
+    closed = closed_, logged = closed_logged_;
+  }
+  for (const LoggedAction& action : next) core_->act(action);
+  core_->close_actions(closed, logged);
 }
 
 void Daemon::release() {

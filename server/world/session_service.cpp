@@ -135,8 +135,10 @@ wire::Answer SessionService::answer_to(const wire::Request& request) {
   return desk_.answer(request, "", displayed_);
 }
 
-// What a world lacks of what was told some time ago.
-void SessionService::tell_again(double now) {
+// What is new in the log, and what a world lacks of what was told some time ago. Nothing before the start: not all who
+// are to hear it may be there.
+void SessionService::tell_log(double now) {
+  if (phase_ == wire::PHASE_GATHERING) return;
   const auto& log = desk_.entries();
   for (Seat& seat : seats_) {
     if (seat.logged >= told_ || !seat.reported) {
@@ -224,7 +226,7 @@ wire::Control SessionService::next(double now) {
     control.limit(order.limit);
     control.closed(order.closed);
   }
-  tell_again(now);
+  tell_log(now);
   control.logged(told_);
   control.pace(pacer_.rate() * session_.dt());
   control.paused(pacer_.paused());

@@ -65,7 +65,7 @@ class SessionService {
   void excuse_own_pause(double now);
   void look_for_the_gone(double now);
   wire::Answer answer_to(const wire::Request& request);
-  void tell_again(double now);
+  void tell_log(double now);
 
   const wire::Session session_;
   const Outlet outlet_;

@@ -21,7 +21,16 @@ class Actor {
 
   std::vector<LoggedAction> run(std::size_t count, bool ascending) {
     std::vector<Step> at(count);
-    for (Step& step : at) step = 1 + static_cast<Step>(random_() % static_cast<std::uint64_t>(steps_));
+    // Half of the time all at a body or two, and within some steps: what is done later meets what was done before.
+    Step first = 1, steps = steps_;
+    if (random_() % 2 == 0) {
+      steps = std::max<Step>(1, std::min<Step>(steps_ / 2, 25));
+      first = 1 + static_cast<Step>(random_() % static_cast<std::uint64_t>(steps_ - steps + 1));
+      std::swap(targets_[0], targets_[random_() % targets_.size()]);
+      std::swap(targets_.back(), targets_[random_() % targets_.size()]);
+      if (targets_.size() > 2) targets_.erase(targets_.begin() + 1, targets_.end() - 1);
+    }
+    for (Step& step : at) step = first + static_cast<Step>(random_() % static_cast<std::uint64_t>(steps));
     if (ascending) std::sort(at.begin(), at.end());
     for (const Step step : at) {
       auto result = log_.add({one(), step, {}}, ascending ? step : 1);

@@ -50,7 +50,7 @@ TEST(ActionFile, WhatIsWrongIsNamed) {
   const std::pair<const char*, const char*> cases[] = {
       {"action { step: 1 push { impulse { z: 5 } } }", "a.txtpb: action 1: push.body: must name a body"},
       {"action { push { body: 1 } }", "action 1: must say when"},
-      {"action { step: 0 push { body: 1 } }", "action 1: step: must be 1 or later"},
+      {"action { step: 0 push { body: 1 } }", "action 1: step: must be between 1"},
       {"action { time: -1 push { body: 1 } }", "action 1: time: must not be negative"},
       {"action { step: 1 push { body: 1 impulse { z: nan } } }", "push.impulse: must be finite"},
       {"action { step: 1 push { body: 1 impulse { z: 1e30 } } }", "push.impulse: must not be longer than"},
@@ -123,7 +123,10 @@ TEST_F(Log, GivesNumbersStepsAndIds) {
   EXPECT_EQ(std::get<Spawn>(spawned.action).body->bodies.front().id, 6u);  // the ground is 5
   EXPECT_EQ(std::get<Spawn>(accepted(ball(0.2), 10).action).body->bodies.front().id, 7u);
   EXPECT_EQ(accepted(Push{6}, 20).step, 60);  // not before it is there
-  EXPECT_EQ(log.entries().size(), 5u);
+  EXPECT_EQ(accepted(SetPose{1, Vec3(0, 0, 5)}, 1000).step, 1000);
+  EXPECT_EQ(accepted(Push{1}, 70).step, 70);  // what is planned for later binds nobody
+  EXPECT_EQ(accepted(Push{1}, 1000).step, 1001);
+  EXPECT_EQ(log.entries().size(), 8u);
 }
 
 TEST_F(Log, WhatFollowsANewPlaceComesAfterIt) {
@@ -144,6 +147,7 @@ TEST_F(Log, RefusesWhatCannotBe) {
   accepted(Release{grab}, 9);
   EXPECT_EQ(refused(Release{grab}, 10), "number 1 is not a grab that lasts");
   EXPECT_EQ(log.entries().size(), 3u) << "something refused is in the log";
+  EXPECT_EQ(refused(Push{1}, kMaxActionStep + 1).find("step"), 0u);
   auto wrong_id = log.add({ball(0.1), 5, 99}, 1);
   EXPECT_TRUE(std::holds_alternative<ActionLog::Refused>(wrong_id));
 }
