@@ -157,7 +157,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     Step end = std::min({settings_.last_step, limit_, final_ + settings_.window});
     if (settings_.sync == Sync::kConservative) end = std::min(end, closed_);
     for (Step step = final_; step < end && step <= timeline_.newest(); ++step) {
-      if (!may_process(step)) return false;
+      if (!may_process(step) || (step == timeline_.newest() && had_better_listen())) return false;
       if ((timeline_.has_pending(step) || step == timeline_.newest()) && is_worth(step)) {
         if (step == timeline_.newest() && !context_.all_have_reached(step)) ++stats_.anticipated;
         timeline_.process(step);
@@ -169,6 +169,14 @@ class WorldCore::Impl final : timeline::Arbiter {
         return true;
     }
     return false;
+  }
+
+  // With the window nearly full, the next step is not needed for long, and what others say, which makes steps final,
+  // would have to wait until it is done.
+  bool had_better_listen() const {
+    constexpr Step kNearly = 8;
+    return settings_.window > 2 * kNearly && timeline_.newest() + kNearly >= final_ + settings_.window &&
+           final_ < std::min(timeline_.newest(), closed_) && !links_.empty();
   }
 
   // Whether more would come of doing a step's pending bodies now than islands that must wait, to be found again when
