@@ -43,22 +43,22 @@ wire::Answer ActionDesk::answer(const wire::Request& request, const std::string&
   return answer;
 }
 
-wire::Answer ActionDesk::act(const wire::Request& request, Step first_open) {
-  try {
-    const std::string_view bytes(reinterpret_cast<const char*>(request.action().data()), request.action().size());
-    WantedAction wanted = decode_action(bytes, *scene_);
-    wanted.step.reset();  // one that has been waited for would bind a body until then
-    const auto result = log_.add(std::move(wanted), first_open);
-    if (const auto* refused = std::get_if<ActionLog::Refused>(&result)) return answer(request, refused->reason, 0);
-    const auto& action = std::get<LoggedAction>(result);
-    append(action);
-    wire::Answer accepted = answer(request, "", action.step);
-    accepted.logged(action.number);
-    if (const auto* spawn = std::get_if<Spawn>(&action.action)) accepted.body(spawn->body->bodies.front().id);
-    return accepted;
-  } catch (const ActionError& e) {
-    return answer(request, e.what(), 0);
-  }
+WantedAction ActionDesk::read(const wire::Request& request) const {
+  const std::string_view bytes(reinterpret_cast<const char*>(request.action().data()), request.action().size());
+  WantedAction wanted = decode_action(bytes, *scene_);
+  wanted.step.reset();  // one that has been waited for would bind a body until then
+  return wanted;
+}
+
+wire::Answer ActionDesk::act(const wire::Request& request, WantedAction wanted, Step first_open) {
+  const auto result = log_.add(std::move(wanted), first_open);
+  if (const auto* refused = std::get_if<ActionLog::Refused>(&result)) return answer(request, refused->reason, 0);
+  const auto& action = std::get<LoggedAction>(result);
+  append(action);
+  wire::Answer accepted = answer(request, "", action.step);
+  accepted.logged(action.number);
+  if (const auto* spawn = std::get_if<Spawn>(&action.action)) accepted.body(spawn->body->bodies.front().id);
+  return accepted;
 }
 
 void ActionDesk::note(const wire::Answer& answer) {

@@ -19,8 +19,9 @@ class ActionDesk {
 
   // Whether the request was answered before: then that answer is `answer`, if it was the client's last.
   bool is_repeated(const wire::Request& request, std::optional<wire::Answer>& answer) const;
-  // A request of kind REQUEST_ACTION.
-  wire::Answer act(const wire::Request& request, Step first_open);
+  // What a request of kind REQUEST_ACTION wants. May take long; from any thread, at any time. Throws ActionError.
+  WantedAction read(const wire::Request& request) const;
+  wire::Answer act(const wire::Request& request, WantedAction wanted, Step first_open);
   wire::Answer answer(const wire::Request& request, const std::string& refusal, Step step) const;
   // What was answered; for is_repeated.
   void note(const wire::Answer& answer);

@@ -96,12 +96,20 @@ void SessionService::status(const wire::Status& status) {
 }
 
 void SessionService::request(const wire::Request& request) {
+  // Before anything is locked: a large body takes its time.
+  std::optional<WantedAction> wanted;
+  std::string problem;
+  try {
+    if (request.kind() == wire::REQUEST_ACTION) wanted = desk_.read(request);
+  } catch (const ActionError& e) {
+    problem = e.what();
+  }
   {
     const std::lock_guard lock(mutex_);
     if (request.instance() != 0 && request.instance() != session_.instance()) return;
     std::optional<wire::Answer> answer;
     if (!desk_.is_repeated(request, answer)) {
-      answer = answer_to(request);
+      answer = problem.empty() ? answer_to(request, std::move(wanted)) : desk_.answer(request, problem, displayed_);
       desk_.note(*answer);
     }
     if (!answer) return;
@@ -111,14 +119,14 @@ void SessionService::request(const wire::Request& request) {
   changed_.notify_one();
 }
 
-wire::Answer SessionService::answer_to(const wire::Request& request) {
+wire::Answer SessionService::answer_to(const wire::Request& request, std::optional<WantedAction> wanted) {
   if (phase_ == wire::PHASE_ENDED || phase_ == wire::PHASE_FAILED)
     return desk_.answer(request, "the session has ended", displayed_);
   switch (request.kind()) {
     case wire::REQUEST_ACTION:
       if (closed_ >= session_.last_step())
         return desk_.answer(request, "the session's last step is closed for actions", displayed_);
-      return desk_.act(request, closed_ + 1);
+      return desk_.act(request, std::move(wanted.value()), closed_ + 1);
     case wire::REQUEST_PAUSE:
       pacer_.pause();
       break;

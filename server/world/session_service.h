@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -64,7 +65,7 @@ class SessionService {
   bool all(std::uint8_t state, double now) const;  // whether all seats are taken and have got that far
   void excuse_own_pause(double now);
   void look_for_the_gone(double now);
-  wire::Answer answer_to(const wire::Request& request);
+  wire::Answer answer_to(const wire::Request& request, std::optional<WantedAction> wanted);
   void tell_log(double now);
 
   const wire::Session session_;
