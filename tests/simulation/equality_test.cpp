@@ -138,6 +138,25 @@ TEST(Actions, WhatRestedOnABodyFallsWhenItIsGone) {
   }
 }
 
+// Some of what `simulate` does by the hundred, small ones, so that sanitizers see them, too.
+TEST(Actions, OfAllKindsInSomeSessions) {
+  int sessions = 0;
+  std::uint64_t done = 0, redone = 0;
+  for (std::uint64_t seed = 1; sessions < 8; ++seed) {
+    const Scenario scenario = scenario_of(seed);
+    if (scenario.actions.size() < 5 || scenario.network.sync == border::Sync::kConservative ||
+        (scenario.scene != "cubes" && scenario.scene != "sleeping_chain" && scenario.scene != "corner"))
+      continue;
+    ++sessions;
+    const SessionResult got = run_scenario(scenario);
+    EXPECT_EQ(got.failure, "") << "seed " << seed << ": " << scenario.text();
+    done += got.total.actions;
+    redone += got.total.timeline.bodies_redone;
+  }
+  EXPECT_GT(done, 8u * 2 * 5 / 2);
+  EXPECT_GT(redone, 0u);
+}
+
 // A body is handed over while its old owner is ahead, and falls asleep close by: for a while the old owner has records
 // of its own and those it is told. (Once it then looked for the body where its own had been, and the session stood
 // still.)
