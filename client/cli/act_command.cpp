@@ -43,8 +43,11 @@ int ask(const Target& target, wire::Request request, const std::function<void(co
   try {
     const auto answer = Requester(target.network, target.session).ask(std::move(request), kPatience);
     if (!answer) {
-      std::fprintf(stderr, "error: nobody answers in session '%s'\n", target.session.c_str());
-      return kExitFailed;
+      std::fprintf(stderr,
+                   "error: nobody answers in session '%s': is it running under that name (soda run --session), with a "
+                   "network, in this domain?\n",
+                   target.session.c_str());
+      return kExitNobody;
     }
     if (!answer->accepted()) {
       std::fprintf(stderr, "refused: %s\n", answer->reason().c_str());

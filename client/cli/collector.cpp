@@ -175,6 +175,11 @@ bool Collector::complete() const {
                      [](const wire::Status& status) { return status.state() == wire::STATE_DONE; });
 }
 
+bool Collector::silent_for(Clock::duration time) const {
+  const auto newest = std::max_element(heard_.begin(), heard_.end());
+  return newest != heard_.end() && *newest && Clock::now() - **newest > time;
+}
+
 void Collector::tick() {
   if (recorder_) recorder_->tick();
 }

@@ -64,6 +64,8 @@ class Collector {
   const std::vector<wire::Status>& worlds() const { return worlds_; }  // by world; state PREPARING until heard of
   // Time of a world's last status; none if it was not heard of.
   std::optional<Clock::time_point> heard(WorldId world) const { return heard_.at(world); }
+  // Whether worlds have been heard of, and none for that long.
+  bool silent_for(Clock::duration time) const;
   Step whole_steps() const { return next_whole_; }  // digests of steps 0 .. whole_steps() - 1 are complete
   std::uint64_t bodies() const { return bodies_; }  // of the newest whole step
   std::optional<Clock::time_point> began() const { return began_; }  // the first world started

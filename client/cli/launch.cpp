@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -44,6 +45,9 @@ class Descriptor {
  private:
   int fd_;
 };
+
+// How long to look for another session of the same name.
+constexpr std::chrono::milliseconds kLookForOthers{1000};
 
 // Where world 0 finds what it inherits.
 constexpr int kSceneFd = 3, kReportFd = 4, kActionsFd = 5;
@@ -108,7 +112,8 @@ std::vector<std::string> arguments(const LaunchOptions& o, double dt, WorldId wo
 }  // namespace
 
 void check(LaunchOptions& o) {
-  if (o.session.empty()) o.session = new_session_name();
+  o.named = !o.session.empty();
+  if (!o.named) o.session = new_session_name();
   if (!dds::good_session_name(o.session))
     throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" + o.session +
                                 "'");
@@ -134,7 +139,6 @@ int launch(LaunchOptions options, const Scene& scene, const std::vector<LoggedAc
   const auto scene_fd = in_memory(encoded), actions_fd = in_memory(encode_actions(actions));
   if (!options.follow.files.record.empty()) options.follow.files.encoded_scene = std::move(encoded);
   // In this order: the source hears before anybody speaks, and outlives the daemons.
-  Collector collector(options.follow.files);
   Table table(options.follow.quiet);
   std::unique_ptr<ReportSource> source;
   std::unique_ptr<Descriptor> pipe_in, pipe_out;
@@ -148,6 +152,9 @@ int launch(LaunchOptions options, const Scene& scene, const std::vector<LoggedAc
     source = std::make_unique<DdsSource>(options.network, options.session, !options.follow.files.dump.empty(),
                                          !options.follow.files.record.empty());
   }
+  if (options.named && !options.single() && source->next(kLookForOthers))
+    throw std::invalid_argument("session '" + options.session + "' runs already: choose another --session");
+  Collector collector(options.follow.files);
   Processes processes(
       [&](const std::string& name, const std::string& line) { show_line(table, name, line, options.follow.verbose); });
   for (const WorldId world : start) {

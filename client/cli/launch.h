@@ -15,6 +15,7 @@ namespace soda::cli {
 
 struct LaunchOptions {
   std::string session;  // "": a new name
+  bool named = false;   // by the user: somebody else may have chosen it, too
   WorldId worlds = 4;
   Step steps = kDefaultSteps;
   std::string pace = "realtime";

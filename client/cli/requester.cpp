@@ -1,10 +1,13 @@
 #include "client/cli/requester.h"
 
+#include <algorithm>
 #include <random>
 #include <utility>
 
 namespace soda::cli {
 namespace {
+
+constexpr std::chrono::milliseconds kAgain{1000};
 
 std::uint64_t random_client() {
   std::random_device device;
@@ -31,10 +34,14 @@ std::optional<wire::Answer> Requester::ask(wire::Request request, std::chrono::m
   request.number(++number_);
   std::unique_lock lock(mutex_);
   answer_.reset();
-  lock.unlock();
-  if (!requests_->write(request)) return std::nullopt;
-  lock.lock();
-  changed_.wait_for(lock, at_most, [&] { return answer_ && answer_->number() == number_; });
+  const auto until = std::chrono::steady_clock::now() + at_most;
+  // Again and again: it is done once, however often it arrives.
+  while (!answer_ && std::chrono::steady_clock::now() < until) {
+    lock.unlock();
+    (void)requests_->write(request);
+    lock.lock();
+    changed_.wait_for(lock, std::min(kAgain, at_most), [&] { return answer_ && answer_->number() == number_; });
+  }
   return std::exchange(answer_, std::nullopt);
 }
 

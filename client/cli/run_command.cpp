@@ -3,8 +3,10 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -59,6 +61,16 @@ int run(RunOptions& options) {
     throw std::invalid_argument("--worlds: there is only one world with --sync single");
   if (options.poses_given && options.follow.files.record.empty())
     throw std::invalid_argument("--record-poses: needs --record FILE");
+  // Nothing may be written over what is read, or over each other.
+  const auto& files = options.follow.files;
+  std::vector<std::filesystem::path> used{std::filesystem::weakly_canonical(options.scene)};
+  for (const std::filesystem::path& path :
+       {std::filesystem::path(options.actions), files.hash_log, files.dump, files.record, options.follow.stats}) {
+    if (path.empty()) continue;
+    used.push_back(std::filesystem::weakly_canonical(path));
+    if (std::count(used.begin(), used.end(), used.back()) > 1)
+      throw std::invalid_argument(path.string() + ": is named twice, for different things");
+  }
   check(options);
   StopSignals signals;
   // An import can take long, and knows no signals; nothing has been started yet that would have to be ended.

@@ -13,6 +13,7 @@ using namespace std::chrono_literals;
 constexpr auto kPoll = 50ms;
 constexpr auto kEndAtMost = 15s;  // for daemons to end by themselves once the session is over
 constexpr auto kStopAtMost = 5s;  // for daemons to end when asked to
+constexpr auto kGoneAfter = 15s;  // for a session that was not started here
 constexpr auto kLastWords = 3s;   // for reports under way, once every daemon has ended
 
 // Says how a daemon ended that should not have, with the end of its log.
@@ -40,6 +41,10 @@ class Follower {
         if (ended.exit_code != 0) return failed(ended);
       }
       table_.update(collector_);
+      if (!own && collector_.silent_for(kGoneAfter)) {
+        table_.say("the session is gone: nothing has come from any of its worlds for some time");
+        return kExitFailed;
+      }
       if (own && processes_.running() == 0 && (source_.closed() || Clock::now() - last_end > kLastWords)) {
         table_.say("the daemons have ended, but not all that they computed was heard of");
         return kExitFailed;

@@ -13,7 +13,7 @@
 
 namespace soda::cli {
 
-enum ExitCode { kExitEqual = 0, kExitOk = 0, kExitDifferent = 1, kExitFailed = 1, kExitBadInput = 2 };
+enum ExitCode { kExitEqual = 0, kExitOk = 0, kExitDifferent = 1, kExitFailed = 1, kExitBadInput = 2, kExitNobody = 3 };
 
 // What `soda run` and `soda watch` have in common.
 struct FollowOptions {

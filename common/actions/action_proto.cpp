@@ -136,7 +136,7 @@ Action read_kind(const pb::Action& m, const Scene& scene) {
     case pb::Action::KIND_NOT_SET:
       break;
   }
-  throw ActionError("no action that this version knows");
+  throw ActionError("says nothing that is to be done (push, velocity, pose, grab, move, release, spawn, remove)");
 }
 
 // Keeps the first error; the others are mostly its consequences.
@@ -191,7 +191,7 @@ WantedAction from_proto(const pb::Action& message, const Scene& scene) {
   } else if (message.when_case() == pb::Action::kTime) {
     const double steps = std::ceil(message.time() / scene.dt * (1 - 1e-12));
     if (!(steps >= 0 && steps <= static_cast<double>(kMaxActionStep)))
-      throw ActionError("time: must not be negative, is " + number_text(message.time()));
+      throw ActionError("time: must be from 0 to that of step 2^40, is " + number_text(message.time()));
     wanted.step = std::max<Step>(1, static_cast<Step>(steps));
   }
   return wanted;

@@ -7,7 +7,9 @@
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/utils/IPFinder.h>
 #include <fastrtps/utils/IPLocator.h>
+#include <fcntl.h>
 #include <spdlog/spdlog.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -30,6 +32,7 @@
 #include <iterator>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <stop_token>
 #include <string>
@@ -118,6 +121,23 @@ int fresh_participant_id(int domain) {
     if (const int id = (start + i) % kIds; !taken(id)) return id;
   return start;
 }
+
+// Held while a process chooses its id and takes the ports that go with it: of several that start at once, two would
+// choose the same.
+class IdLock {
+ public:
+  IdLock() : file_(::open("/dev/shm/soda-participants.lock", O_CREAT | O_RDONLY | O_CLOEXEC, 0666)) {
+    if (file_ >= 0) (void)::flock(file_, LOCK_EX);
+  }
+  ~IdLock() {
+    if (file_ >= 0) ::close(file_);
+  }
+  IdLock(const IdLock&) = delete;
+  IdLock& operator=(const IdLock&) = delete;
+
+ private:
+  int file_;  // -1 where there is none to be had: then it is as without
+};
 
 void set_discovery(const NetworkOptions& options, fdds::DomainParticipantQos& qos) {
   auto& config = qos.wire_protocol().builtin.discovery_config;
@@ -337,13 +357,16 @@ Participant::Participant(const NetworkOptions& options, const std::string& sessi
   fdds::DomainParticipantQos qos;
   qos.name(name);
   set_transports(options, qos);
+  std::optional<IdLock> lock;
   if (options.shared_memory) {
     remove_stale_shm();
+    lock.emplace();
     qos.wire_protocol().participant_id = fresh_participant_id(static_cast<int>(options.domain));
   }
   set_discovery(options, qos);
   impl_->participant = fdds::DomainParticipantFactory::get_instance()->create_participant(
       options.domain, qos, impl_.get(), fdds::StatusMask::none());
+  lock.reset();
   if (impl_->participant == nullptr)
     throw std::runtime_error("cannot join DDS domain " + std::to_string(options.domain) + " on interface " +
                              options.interface);

@@ -142,8 +142,35 @@ TEST_F(AllLong, MemoryStaysFlat) {
   EXPECT_LT(late, early * 1.1);
 }
 
+TEST_F(Acting, ManyAtOnceAreAllAnsweredOnce) {
+  auto running = start(scene("cubes", 60), 2, 100000, {"--record", path("a.rec")});
+  std::vector<std::unique_ptr<Program>> users;
+  for (int i = 1; i <= 10; ++i)
+    users.push_back(std::make_unique<Program>(
+        soda({"act", "push", std::to_string(i), "--impulse", "0", "0", "9", "--session", session}), directory()));
+  for (const auto& user : users) expect_exit(*user, 0, 30s);
+  running->signal(SIGINT);
+  expect_exit(*running, 128 + SIGINT);
+  expect_says(run({"verify", path("a.rec"), "--sync", "single", "-q"}), " 10 actions");
+}
+
+TEST_F(Acting, TheNameOfARunningSessionIsTaken) {
+  const std::string file = scene("cubes", 60);
+  auto running = start(file, 2, 100000);
+  expect_says(run({"run", file, "--session", session, "--worlds", "2", "--record", path("other.rec")}, 2),
+              "runs already");
+  EXPECT_FALSE(std::filesystem::exists(path("other.rec"))) << "it has begun to write";
+  // Who watches it notices its end, whatever it is.
+  Program watch(soda({"watch", "--session", session}), directory());
+  EXPECT_TRUE(watch.wrote("steps/s", 30s));
+  ASSERT_EQ(::kill(running->pid(), SIGKILL), 0);
+  expect_exit(*running, -SIGKILL);
+  expect_exit(watch, 1, 60s);
+  EXPECT_NE(watch.output().find("is gone"), std::string::npos) << watch.output();
+}
+
 TEST_F(Acting, NobodyThereIsSaid) {
-  expect_says(ask({"act", "remove", "1"}, 1), "nobody answers in session");
+  expect_says(ask({"act", "remove", "1"}, 3), "nobody answers in session");
   expect_says(run({"speed", "sometimes", "--session", session}, 2), "a pace is");
   expect_says(run({"run", scene("cubes", 20), "--actions", path("nowhere")}, 2), "nowhere");
   std::ofstream(path("bad.txtpb")) << "action { step: 4 push { body: 7777 impulse { z: 1 } } }\n";

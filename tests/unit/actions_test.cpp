@@ -51,7 +51,7 @@ TEST(ActionFile, WhatIsWrongIsNamed) {
       {"action { step: 1 push { impulse { z: 5 } } }", "a.txtpb: action 1: push.body: must name a body"},
       {"action { push { body: 1 } }", "action 1: must say when"},
       {"action { step: 0 push { body: 1 } }", "action 1: step: must be between 1"},
-      {"action { time: -1 push { body: 1 } }", "action 1: time: must not be negative"},
+      {"action { time: -1 push { body: 1 } }", "action 1: time: must be from 0"},
       {"action { step: 1 push { body: 1 impulse { z: nan } } }", "push.impulse: must be finite"},
       {"action { step: 1 push { body: 1 impulse { z: 1e30 } } }", "push.impulse: must not be longer than"},
       {"action { step: 1 velocity { body: 1 linear { z: 101 } } }", "velocity.linear: must not be longer than 100 m/s"},
@@ -60,7 +60,7 @@ TEST(ActionFile, WhatIsWrongIsNamed) {
       {"action { step: 1 grab { body: 1 frequency: -2 } }", "grab.frequency: must be between"},
       {"action { step: 1 spawn { body { shape { sphere { radius: -1 } } } } }", "spawn.body.shape[0].sphere.radius"},
       {"action { step: 1 spawn { body { static: true shape { sphere { radius: 1 } } } } }", "only dynamic bodies"},
-      {"action { step: 1 }\n", "action 1: no action that this version knows"},
+      {"action { step: 1 }\n", "action 1: says nothing that is to be done"},
       {"action { step: 1 push { body: 1 } }\naction { step: 1 shove { body: 1 } }", "a.txtpb:2: "},
   };
   for (const auto& [text, message] : cases) {
