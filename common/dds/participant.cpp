@@ -32,7 +32,6 @@
 #include <iterator>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <stdexcept>
 #include <stop_token>
 #include <string>
@@ -357,10 +356,10 @@ Participant::Participant(const NetworkOptions& options, const std::string& sessi
   fdds::DomainParticipantQos qos;
   qos.name(name);
   set_transports(options, qos);
-  std::optional<IdLock> lock;
+  std::unique_ptr<IdLock> lock;
   if (options.shared_memory) {
     remove_stale_shm();
-    lock.emplace();
+    lock = std::make_unique<IdLock>();
     qos.wire_protocol().participant_id = fresh_participant_id(static_cast<int>(options.domain));
   }
   set_discovery(options, qos);
