@@ -89,6 +89,7 @@ wire::Session describe(const Options& options, const EncodedScene& scene) {
   s.pace(options.pace);
   s.dump_first(options.dump_first);
   s.dump_last(options.dump_last);
+  s.watched(options.supervised_by != 0);
   s.pose_every(static_cast<std::uint32_t>(options.pose_every));
   return s;
 }
@@ -286,8 +287,7 @@ int run_guest(const Options& options, StopSignals& signals) {
   spdlog::info("admitted to session '{}' as world {} of {}", options.session, options.world, session.worlds());
   Scene scene = decode_scene(admitted->encoded_scene, "the scene of session '" + options.session + "'");
   admitted->encoded_scene = {};
-  DdsReports reports(participant, options.supervised_by != 0, session.dump_first() >= 0, session.pose_every() > 0,
-                     stop);
+  DdsReports reports(participant, session.watched(), session.dump_first() >= 0, session.pose_every() > 0, stop);
   DdsTransport transport(participant, options.world);
   Daemon daemon(std::move(scene), settings_of(session, options), transport, reports);
   // The guest outlives the daemon, and must not talk to it then, whatever happens.
