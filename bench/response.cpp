@@ -185,7 +185,7 @@ void measure(const Options& options, int lead, Csv& csv, Headline& headline) {
 }  // namespace
 
 void response(const Options& options, Headline& headline) {
-  Csv csv(options, "response.csv", "lead,answered_ms,displayed_ms,final_ms");
+  Csv csv(options, "response", "lead,answered_ms,displayed_ms,final_ms");
   for (const int lead : {2, 4}) measure(options, lead, csv, headline);
   csv.close();
   plot(options, "response",

@@ -4,17 +4,9 @@
 #include <utility>
 
 #include "common/grid.h"
+#include "common/overloaded.h"
 
 namespace soda {
-namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-
-}  // namespace
-
 ActionLog::ActionLog(const Scene& scene)
     : scene_(scene),
       largest_radius_(largest_later_radius(scene, make_grid(scene))),

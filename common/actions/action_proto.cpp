@@ -9,6 +9,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/overloaded.h"
 #include "common/scene/proto_geometry.h"
 #include "common/scene/proto_scene.h"
 #include "common/scene/scene_file.h"
@@ -163,11 +164,6 @@ std::vector<WantedAction> read_all(const pb::ActionFile& file, const std::string
   return actions;
 }
 
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-
 }  // namespace
 
 const char* name_of(const Action& action) {
@@ -255,13 +251,7 @@ WantedAction decode_action(std::string_view bytes, const Scene& scene) {
 }
 
 std::string encode_action(const LoggedAction& logged) {
-  std::string bytes;
-  gp::io::StringOutputStream stream(&bytes);
-  gp::io::CodedOutputStream coded(&stream);
-  coded.SetSerializationDeterministic(true);
-  to_proto(logged).SerializeToCodedStream(&coded);
-  coded.Trim();
-  return bytes;
+  return to_proto(logged).SerializeAsString();  // the same each time, as there are no maps in it
 }
 
 std::string encode_actions(const std::vector<LoggedAction>& log) {

@@ -41,7 +41,7 @@ class WorldCore::Impl final : timeline::Arbiter {
       if (h.to != settings_.me) throw CodecError("border message for world " + std::to_string(h.to));
       Link* link = context_.link_to(h.from);
       if (!link) throw CodecError("border message from world " + std::to_string(h.from) + ", which is no neighbour");
-      if (h.logged > logged_) return hold_back(bytes);
+      if (h.logged > logged_) return hold_back(h.logged, bytes);
       Message message = decode(bytes, model_);
       check(message, settings_.me, map_.worlds);
       return take(*link, std::move(message));
@@ -51,13 +51,26 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // It may be of bodies that are not known here yet. What is lost for want of room is asked for again.
-  bool hold_back(std::span<const std::byte> bytes) {
+  bool hold_back(ActionNumber logged, std::span<const std::byte> bytes) {
     constexpr std::size_t kAtMost = 4096, kBytesAtMost = std::size_t{256} << 20;
     ++stats_.held_back;
-    if (held_back_.size() >= kAtMost || held_bytes_ + bytes.size() > kBytesAtMost) return true;
-    held_back_.emplace_back(bytes.begin(), bytes.end());
+    if (held_messages_ >= kAtMost || held_bytes_ + bytes.size() > kBytesAtMost) return true;
+    held_back_[logged].emplace_back(bytes.begin(), bytes.end());
+    ++held_messages_;
     held_bytes_ += bytes.size();
     return true;
+  }
+
+  // Those that presuppose no more than is known now.
+  void receive_held_back() {
+    while (!held_back_.empty() && held_back_.begin()->first <= logged_) {
+      const auto ready = held_back_.extract(held_back_.begin());
+      for (const auto& bytes : ready.mapped()) {
+        --held_messages_;
+        held_bytes_ -= bytes.size();
+        (void)receive(bytes);  // refusals are counted
+      }
+    }
   }
 
   bool refuse(const CodecError& error) {
@@ -109,8 +122,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     deferred_.clear();
     changed();
     close();
-    held_bytes_ = 0;
-    for (const auto& bytes : std::exchange(held_back_, {})) (void)receive(bytes);  // refusals are counted
+    receive_held_back();
     return true;
   }
 
@@ -422,8 +434,8 @@ class WorldCore::Impl final : timeline::Arbiter {
   ActionNumber logged_ = 0;
   Step closed_;                                          // no action comes for steps up to this one
   std::vector<std::pair<Step, ActionNumber>> closings_;  // that presuppose entries of the log which have not come yet
-  std::size_t held_bytes_ = 0;
-  std::vector<std::vector<std::byte>> held_back_;  // messages, likewise
+  std::map<ActionNumber, std::vector<std::vector<std::byte>>> held_back_;  // messages, by what they presuppose
+  std::size_t held_messages_ = 0, held_bytes_ = 0;
   bool begun_ = false;
   std::map<Step, std::size_t> deferred_;  // steps that were not worth doing, with so many pending bodies
   bool idle_ = false;                     // nothing can be done before something comes

@@ -5,15 +5,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "common/overloaded.h"
+#include "server/timeline/marks.h"
+
 namespace soda::timeline {
 namespace {
 
 constexpr Step kEver = std::numeric_limits<Step>::max();
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 }  // namespace
 
@@ -89,8 +87,7 @@ std::vector<Slot> Effects::acted_on(Step step) const {
     for (const auto& [slot, list] : at_step->second) slots.push_back(slot);
   for (const Held& h : held_)
     if (h.acts(step)) slots.push_back(h.slot);
-  std::sort(slots.begin(), slots.end());
-  slots.erase(std::unique(slots.begin(), slots.end()), slots.end());
+  sort_unique(slots);
   return slots;
 }
 

@@ -207,7 +207,6 @@ bool Timeline::is_indexed() const {
 }
 
 // ---- what users do
-// ---------------------------------------------------------------------------------------------------
 
 void Timeline::act(const LoggedAction& action) {
   for (const Effects::Change& change : effects_.add(action))
