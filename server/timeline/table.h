@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/prefetch.h"
 #include "server/timeline/ref.h"
 
 namespace soda::timeline {
@@ -77,12 +78,21 @@ class Table {
   struct Page {
     std::uint32_t references = 0;
     std::array<Ref<T>, kPageSlots> slots;
-    friend void release(Page* page) { delete page; }
+    // What falls out of the window has long left the caches: all of it is asked for at once.
+    friend void release(Page* page) {
+      for (const Ref<T>& slot : page->slots)
+        if (slot) prefetch(&slot->references, sizeof slot->references);
+      delete page;
+    }
   };
   struct Group {
     std::uint32_t references = 0;
     std::array<Ref<Page>, kGroupPages> pages;
-    friend void release(Group* group) { delete group; }
+    friend void release(Group* group) {
+      for (const Ref<Page>& page : group->pages)
+        if (page) prefetch(page.get(), sizeof(Page));
+      delete group;
+    }
   };
 
   Ref<Page>& own_page(Slot page_number) {
