@@ -304,10 +304,12 @@ bool Settler::part_is_final(Step step, WorldId origin) const {
   const Exchange& exchange = at(step);
   const Part* const part = exchange.parts.find(origin);
   if (!part) return false;
-  if (exchange.direct.contains(origin))
-    if (const Link* link = context_.link_to(origin)) return link->near_final() >= step;
+  // Once final it stays so, whoever said it first: what rests on it may have become final in between.
   const auto told = exchange.finals.find(origin);
-  return told != exchange.finals.end() && told->second == part->revision;
+  if (told != exchange.finals.end() && told->second == part->revision) return true;
+  if (!exchange.direct.contains(origin)) return false;
+  const Link* const link = context_.link_to(origin);
+  return link && link->near_final() >= step;
 }
 
 bool Settler::all_final(Step step) const {
@@ -321,10 +323,13 @@ bool Settler::all_final(Step step) const {
 
 std::string Settler::why_not_final(Step step) const {
   const Exchange& exchange = at(step);
+  const bool part_made = !exchange.part_stale && exchange.parts.find(context_.settings.me);
   std::string text = exchange.retry ? "islands to be tried; " : "";
+  if (!part_made) text += "this world's part is not made yet; ";
   for (const KeptIsland& island : exchange.kept) {
-    const MixedIslands::Closure closure =
-        island.shared ? exchange.parts.close({context_.settings.me, island.index}) : MixedIslands::Closure{};
+    const MixedIslands::Closure closure = island.shared && part_made
+                                              ? exchange.parts.close({context_.settings.me, island.index})
+                                              : MixedIslands::Closure{};
     text += "island of";
     for (const timeline::Slot slot : island.island->own) text += " " + std::to_string(context_.model.bodies()[slot].id);
     text += " with";

@@ -104,6 +104,15 @@ TEST(WideBodies, AreToldToEveryWorldTheyReach) {
   EXPECT_GT(got.total.parts_sent, got.total.syncs);  // parts of others were passed on
 }
 
+// A part came from others, with word that it is final, and then from its origin itself. (Once that word was forgotten
+// then, and not passed on to a third world, which stood still. One seed of ten thousand met that; if what seeds mean
+// changes, this one is an ordinary session.)
+TEST(WideBodies, APartOnceFinalStaysSo) {
+  const Scenario scenario = scenario_of(6049);
+  EXPECT_EQ(scenario.scene, "wide_bodies") << "seeds mean something else now: without the mend, which one fails?";
+  EXPECT_EQ(run_scenario(scenario).failure, "");
+}
+
 TEST(Sleep, NothingIsSentForWhatSleeps) {
   const Scene scene = still_row();
   const SessionResult slept = run_session(scene, 4, 400, {});

@@ -7,6 +7,7 @@
 #include <memory>
 #include <queue>
 #include <random>
+#include <utility>
 
 #include "common/state_hash.h"
 #include "server/physics/model.h"
@@ -158,7 +159,10 @@ class Session {
       if (done && flights_.empty()) break;
       if (moved || !flights_.empty()) idle_since = now;
       if (now - idle_since > patience) {
-        // Only a lost message can bring everything to rest.
+        // Only a lost message can bring everything to rest, and asking again gets things going, if not each time.
+        Step finals = 0;
+        for (const auto& core : cores_) finals += core->final_step();
+        if (std::exchange(finals_, finals) != finals) stuck_ = 0;
         if (result_.lost == 0 || ++stuck_ > 200) return fail(standstill());
         for (auto& core : cores_)
           for (const WorldId n : core->waiting_for()) core->reconnect(n);
@@ -251,6 +255,7 @@ class Session {
   Service service_;
   std::priority_queue<Flight> flights_;
   std::uint64_t number_ = 0, stuck_ = 0;
+  Step finals_ = 0;  // of all worlds, when everything was at rest last
   SessionResult result_;
 };
 
