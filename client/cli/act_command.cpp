@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "action.pb.h"
+#include "client/cli/exit_code.h"
 #include "client/cli/requester.h"
-#include "client/cli/session_run.h"
 #include "common/dds/checks.h"
 #include "common/run_settings.h"
 
@@ -202,18 +202,14 @@ void add_pace_commands(CLI::App& app, int& exit_code) {
     if (kind == wire::REQUEST_SPEED)
       command->add_option("pace", *value, "'realtime', 'max', or a multiple of real time")->required();
     command->callback([=, &exit_code] {
-      wire::Request request;
-      request.kind(kind);
-      try {
+      exit_code = guarded([&] {
+        wire::Request request;
+        request.kind(kind);
         if (kind == wire::REQUEST_STEP) request.value(value->empty() ? 1 : std::stod(*value));
         if (kind == wire::REQUEST_SPEED) request.value(parse_pace(*value));
-      } catch (const std::invalid_argument& e) {
-        std::fprintf(stderr, "error: %s\n", e.what());
-        exit_code = kExitBadInput;
-        return;
-      }
-      exit_code = ask(*target, std::move(request), [&](const wire::Answer& answer) {
-        std::printf("%s: displayed step %lld\n", name, static_cast<long long>(answer.step()));
+        return ask(*target, std::move(request), [&](const wire::Answer& answer) {
+          std::printf("%s: displayed step %lld\n", name, static_cast<long long>(answer.step()));
+        });
       });
     });
   };

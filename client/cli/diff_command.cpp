@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "client/cli/session_run.h"
+#include "client/cli/exit_code.h"
 #include "common/dump.h"
 
 namespace soda::cli {
@@ -29,14 +29,8 @@ void add_diff_command(CLI::App& app, int& exit_code) {
   command->add_option("a", o->a, "hash log or dump of a run")->required();
   command->add_option("b", o->b, "the same of another run")->required();
   command->footer("Exit codes: 0 equal, 1 different, 2 bad input.");
-  command->callback([o, &exit_code] {
-    try {
-      exit_code = diff(*o);
-    } catch (const std::exception& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    }
-  });
+  // Whatever goes wrong is the fault of a file.
+  command->callback([o, &exit_code] { exit_code = guarded([&] { return diff(*o); }, kExitBadInput); });
 }
 
 }  // namespace soda::cli

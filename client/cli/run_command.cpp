@@ -16,7 +16,6 @@
 #include "common/actions/action_proto.h"
 #include "common/dds/checks.h"
 #include "common/import/load.h"
-#include "common/scene/validate.h"
 
 namespace soda::cli {
 namespace {
@@ -126,29 +125,9 @@ void add_run_command(CLI::App& app, int& exit_code) {
   command->add_flag("--verbose,-v", o->follow.verbose, "show all that the daemons say");
   dds::add_network_options(*command, o->network);
   command->callback([o, command, &exit_code] {
-    try {
-      o->worlds_given = command->count("--worlds") > 0;
-      o->poses_given = command->count("--record-poses") > 0;
-      exit_code = run(*o);
-    } catch (const SceneError& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const ActionError& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const std::invalid_argument& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const RecordingError& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const ReportError& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const std::exception& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitFailed;
-    }
+    o->worlds_given = command->count("--worlds") > 0;
+    o->poses_given = command->count("--record-poses") > 0;
+    exit_code = guarded([&] { return run(*o); });
   });
 }
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "client/cli/exit_code.h"
 #include "common/grid.h"
 #include "common/import/load.h"
 #include "common/scene/extent.h"
@@ -16,10 +17,6 @@
 
 namespace soda {
 namespace {
-
-constexpr int kBadInput = 2;
-
-void print_error(const char* what) { std::fprintf(stderr, "error: %s\n", what); }
 
 // A counter on one line of a terminal; nothing in a log file.
 ProgressFn progress_on_terminal() {
@@ -130,15 +127,14 @@ std::string generator_help() {
   return text;
 }
 
-// Runs an action of the user's; what is wrong with the input becomes a message and the exit code.
+// Runs an action of the user's. Whatever goes wrong is the input's fault: nothing else is asked here.
 template <class Action>
-void guarded(int& exit_code, Action action) {
-  try {
+int run(Action action) {
+  const auto command = [&] {
     action();
-  } catch (const std::exception& e) {
-    print_error(e.what());
-    exit_code = kBadInput;
-  }
+    return cli::kExitOk;
+  };
+  return cli::guarded(command, cli::kExitBadInput);
 }
 
 }  // namespace
@@ -160,7 +156,7 @@ void add_scene_command(CLI::App& app, int& exit_code) {
   make->add_option("-o,--output", made->out, "File to write: .txtpb (text) or .scene (binary)")->required();
   make->footer(generator_help());
   make->callback([made, &exit_code] {
-    guarded(exit_code, [&] {
+    exit_code = run([&] {
       const Scene result = generate(made->name, made->bodies, made->seed);
       save_scene(result, made->out);
       std::printf("%s: %u bodies\n", made->out.c_str(), made->bodies);
@@ -172,7 +168,7 @@ void add_scene_command(CLI::App& app, int& exit_code) {
   convert->add_option("IN", files->first, "Scene to read: .sdf, .world, .txtpb or .scene")->required();
   convert->add_option("OUT", files->second, "File to write: .txtpb or .scene")->required();
   convert->callback([files, &exit_code] {
-    guarded(exit_code, [&] {
+    exit_code = run([&] {
       const Scene result = load_and_warn(files->first);
       save_scene(result, files->second);
       std::printf("%s: %zu bodies\n", files->second.c_str(), result.bodies.size());
@@ -183,7 +179,7 @@ void add_scene_command(CLI::App& app, int& exit_code) {
   CLI::App* check = scene->add_subcommand("check", "Check a scene and say what is in it");
   check->add_option("FILE", *checked, "Scene: .sdf, .world, .txtpb or .scene")->required();
   check->callback(
-      [checked, &exit_code] { guarded(exit_code, [&] { print_summary(load_and_warn(*checked), *checked); }); });
+      [checked, &exit_code] { exit_code = run([&] { print_summary(load_and_warn(*checked), *checked); }); });
 }
 
 }  // namespace soda

@@ -6,14 +6,13 @@
 #include <string>
 
 #include "client/cli/collector.h"
+#include "client/cli/exit_code.h"
 #include "client/cli/processes.h"
 #include "client/cli/report_source.h"
 #include "client/cli/table.h"
 #include "common/stop_signals.h"
 
 namespace soda::cli {
-
-enum ExitCode { kExitEqual = 0, kExitOk = 0, kExitDifferent = 1, kExitFailed = 1, kExitBadInput = 2, kExitNobody = 3 };
 
 // What `soda run` and `soda watch` have in common.
 struct FollowOptions {

@@ -62,19 +62,8 @@ void add_verify_command(CLI::App& app, int& exit_code) {
   command->add_flag("--verbose,-v", o->follow.verbose, "show all that the daemons say");
   dds::add_network_options(*command, o->network);
   command->callback([o, command, &exit_code] {
-    try {
-      o->worlds_given = command->count("--worlds") > 0;
-      exit_code = verify(*o);
-    } catch (const RecordingError& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const std::invalid_argument& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const std::exception& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitFailed;
-    }
+    o->worlds_given = command->count("--worlds") > 0;
+    exit_code = guarded([&] { return verify(*o); });
   });
 }
 

@@ -43,20 +43,7 @@ void add_watch_command(CLI::App& app, int& exit_code) {
   command->add_option("--dump", o->follow.files.dump, "write the whole states that world 0 dumps (its --dump-steps)");
   command->add_flag("--quiet,-q", o->follow.quiet, "no progress");
   dds::add_network_options(*command, o->network);
-  command->callback([o, &exit_code] {
-    try {
-      exit_code = watch(*o);
-    } catch (const std::invalid_argument& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const ReportError& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitBadInput;
-    } catch (const std::exception& e) {
-      std::fprintf(stderr, "error: %s\n", e.what());
-      exit_code = kExitFailed;
-    }
-  });
+  command->callback([o, &exit_code] { exit_code = guarded([&] { return watch(*o); }); });
 }
 
 }  // namespace soda::cli
