@@ -1,9 +1,7 @@
 #include "common/actions/action_proto.h"
 
 #include <google/protobuf/io/coded_stream.h>
-#include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
-#include <google/protobuf/text_format.h>
 
 #include <cmath>
 #include <limits>
@@ -12,6 +10,7 @@
 #include "common/overloaded.h"
 #include "common/scene/proto_geometry.h"
 #include "common/scene/proto_scene.h"
+#include "common/scene/proto_text.h"
 #include "common/scene/scene_file.h"
 #include "common/scene/validate.h"
 
@@ -140,16 +139,6 @@ Action read_kind(const pb::Action& m, const Scene& scene) {
   throw ActionError("says nothing that is to be done (push, velocity, pose, grab, move, release, spawn, remove)");
 }
 
-// Keeps the first error; the others are mostly its consequences.
-class FirstError : public gp::io::ErrorCollector {
- public:
-  void AddError(int line, gp::io::ColumnNumber, const std::string& text) override {
-    if (message.empty()) message = std::to_string(line + 1) + ": " + text;
-  }
-  void AddWarning(int, gp::io::ColumnNumber, const std::string&) override {}
-  std::string message;
-};
-
 std::vector<WantedAction> read_all(const pb::ActionFile& file, const std::string& source, const Scene& scene) {
   std::vector<WantedAction> actions;
   for (int i = 0; i < file.action_size(); ++i) {
@@ -240,11 +229,10 @@ pb::Action to_proto(const LoggedAction& logged) {
 }
 
 WantedAction decode_action(std::string_view bytes, const Scene& scene) {
-  constexpr int kMaxDepth = 64;
   pb::Action message;
   gp::io::ArrayInputStream stream(bytes.data(), static_cast<int>(bytes.size()));
   gp::io::CodedInputStream coded(&stream);
-  coded.SetRecursionLimit(kMaxDepth);
+  coded.SetRecursionLimit(kMaxNesting);
   if (!message.ParseFromCodedStream(&coded) || !coded.ConsumedEntireMessage())
     throw ActionError("not an action (soda.pb.Action)");
   return from_proto(message, scene);
@@ -269,11 +257,8 @@ std::vector<WantedAction> decode_actions(std::string_view bytes, const Scene& sc
 std::vector<WantedAction> actions_from_text(std::string_view text, const std::string& source, const Scene& scene) {
   if (text.size() >= std::size_t{1} << 31) throw ActionError(source + ": is larger than 2 GiB");
   pb::ActionFile file;
-  gp::TextFormat::Parser parser;
-  FirstError error;
-  parser.RecordErrorsTo(&error);
-  gp::io::ArrayInputStream stream(text.data(), static_cast<int>(text.size()));
-  if (!parser.Parse(&stream, &file)) throw ActionError(source + ":" + error.message);
+  if (const auto problem = read_text(text, file))
+    throw ActionError(source + ":" + std::to_string(problem->line) + ": " + problem->reason);
   return read_all(file, source, scene);
 }
 

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <google/protobuf/io/coded_stream.h>
-#include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/text_format.h>
 #include <sys/stat.h>
@@ -12,6 +11,8 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+
+#include "common/scene/proto_text.h"
 
 namespace soda {
 namespace {
@@ -29,7 +30,6 @@ struct Header {
 static_assert(sizeof(Header) == 32, "written as it is");
 constexpr char kMagic[8] = {'S', 'O', 'D', 'A', 's', 'c', 'n', '\n'};
 constexpr std::uint32_t kVersion = 1;
-constexpr int kMaxDepth = 64;  // of compounds within compounds, times two: a message and its Compound
 
 constexpr const char* kTextHeader =
     "# A SODA scene; docs/scenes.md explains the format.\n"
@@ -40,37 +40,10 @@ constexpr const char* kTextHeader =
   throw SceneError(std::string(source), "", "", reason, line);
 }
 
-// Keeps the first error; the others are mostly its consequences.
-class FirstError : public gp::io::ErrorCollector {
- public:
-  void AddError(int line, gp::io::ColumnNumber column, const std::string& text) override {
-    if (!message.empty()) return;
-    message = text;
-    line_ = line + 1;
-    column_ = static_cast<int>(column) + 1;
-  }
-  void AddWarning(int, gp::io::ColumnNumber, const std::string&) override {}
-  [[noreturn]] void raise(std::string_view source) const {
-    refuse(source,
-           message.empty() ? "is not a scene in Protobuf text format"
-                           : message + " (column " + std::to_string(column_) + ")",
-           line_);
-  }
-
- private:
-  std::string message;
-  int line_ = 0, column_ = 0;
-};
-
 void parse_text(std::string_view text, std::string_view source, pb::Scene& message,
                 gp::TextFormat::ParseInfoTree* lines) {
-  gp::TextFormat::Parser parser;
-  FirstError error;
-  parser.RecordErrorsTo(&error);
-  parser.SetRecursionLimit(kMaxDepth);
-  if (lines) parser.WriteLocationsTo(lines);
-  gp::io::ArrayInputStream stream(text.data(), static_cast<int>(text.size()));
-  if (!parser.Parse(&stream, &message)) error.raise(source);
+  if (const auto problem = read_text(text, message, lines))
+    refuse(source, problem->reason + " (column " + std::to_string(problem->column) + ")", problem->line);
 }
 
 // Follows a path such as "body[3].shape[0].box.size.y" as far as the file has it, and returns the line of the last part

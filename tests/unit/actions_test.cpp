@@ -73,6 +73,13 @@ TEST(ActionFile, WhatIsWrongIsNamed) {
   }
 }
 
+TEST(ActionFile, EndlessNestingIsRefused) {
+  std::string text = "action { step: 1 spawn { body { ", end = "} } }";
+  for (int i = 0; i < 10000; ++i) text += "shape { compound { ", end += "} }";
+  EXPECT_THROW(actions_from_text(text + "shape { sphere { radius: 1 } }" + end, "deep.txtpb", small_scene()),
+               ActionError);
+}
+
 TEST(ActionBytes, KeepEveryBit) {
   const Scene scene = small_scene();
   const auto log = random_actions(scene, 100, 200, false, 8);
