@@ -45,13 +45,7 @@ Scene load(const RunOptions& options) {
 std::vector<LoggedAction> log_of(const std::string& file, const Scene& scene) {
   if (file.empty()) return {};
   ActionLog log(scene);
-  std::size_t number = 0;
-  for (WantedAction& wanted : load_actions(file, scene)) {
-    const auto result = log.add(std::move(wanted), 1);
-    ++number;
-    if (const auto* refused = std::get_if<ActionLog::Refused>(&result))
-      throw ActionError(file + ": action " + std::to_string(number) + ": " + refused->reason);
-  }
+  log.add_all(load_actions(file, scene), 1, file + ": ");
   return log.entries();
 }
 

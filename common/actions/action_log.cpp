@@ -118,4 +118,12 @@ std::variant<LoggedAction, ActionLog::Refused> ActionLog::add(WantedAction wante
   return entry;
 }
 
+void ActionLog::add_all(std::vector<WantedAction> wanted, Step first_open, const std::string& where) {
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const auto result = add(std::move(wanted[i]), first_open);
+    if (const auto* refused = std::get_if<Refused>(&result))
+      throw ActionError(where + "action " + std::to_string(i + 1) + ": " + refused->reason);
+  }
+}
+
 }  // namespace soda

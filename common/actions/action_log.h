@@ -26,6 +26,8 @@ class ActionLog {
   // action that wants an earlier one, or says nothing, gets this one. Where a body is moved or removed at that very
   // step, or spawned later, it gets the first at which the body has its new state.
   std::variant<LoggedAction, Refused> add(WantedAction wanted, Step first_open);
+  // Those that a run begins with. Throws ActionError for the first that is refused: `where`, then "action 2: ...".
+  void add_all(std::vector<WantedAction> wanted, Step first_open, const std::string& where = "");
 
   const std::vector<LoggedAction>& entries() const { return entries_; }  // entries()[n - 1] is number n
 

@@ -7,12 +7,8 @@ namespace soda::world {
 
 ActionDesk::ActionDesk(std::uint64_t instance, std::shared_ptr<const Scene> scene, std::vector<WantedAction> actions)
     : instance_(instance), scene_(std::move(scene)), log_(*scene_) {
-  for (std::size_t i = 0; i < actions.size(); ++i) {
-    const auto result = log_.add(std::move(actions[i]), 1);
-    if (const auto* refused = std::get_if<ActionLog::Refused>(&result))
-      throw ActionError("action " + std::to_string(i + 1) + ": " + refused->reason);
-    append(std::get<LoggedAction>(result));
-  }
+  log_.add_all(std::move(actions), 1);
+  for (const LoggedAction& action : log_.entries()) append(action);
 }
 
 void ActionDesk::append(const LoggedAction& action) {
