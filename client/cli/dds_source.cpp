@@ -7,23 +7,21 @@ namespace soda::cli {
 DdsSource::DdsSource(const dds::NetworkOptions& network, const std::string& session, bool with_states,
                      bool for_recording)
     : participant_(network, session, "soda") {
-  if (with_states)
-    states_.emplace(participant_, dds::states_topic(),
-                    [this](wire::StateChunk&& sample, const dds::WriterKey&) { push(std::move(sample)); });
+  if (with_states) hear<wire::StateChunk>(dds::states_topic());
   if (for_recording) {
-    poses_.emplace(participant_, dds::poses_topic(),
-                   [this](wire::Poses&& sample, const dds::WriterKey&) { push(std::move(sample)); });
-    log_.emplace(participant_, dds::action_log_topic(),
-                 [this](wire::LogEntry&& sample, const dds::WriterKey&) { push(std::move(sample)); });
-    control_.emplace(participant_, dds::control_topic(),
-                     [this](wire::Control&& sample, const dds::WriterKey&) { push(std::move(sample)); });
+    hear<wire::Poses>(dds::poses_topic());
+    hear<wire::LogEntry>(dds::action_log_topic());
+    hear<wire::Control>(dds::control_topic());
   }
-  digests_.emplace(participant_, dds::digests_topic(),
-                   [this](wire::Digests&& sample, const dds::WriterKey&) { push(std::move(sample)); });
-  status_.emplace(participant_, dds::status_topic(),
-                  [this](wire::Status&& sample, const dds::WriterKey&) { push(std::move(sample)); });
-  session_.emplace(participant_, dds::session_topic(),
-                   [this](wire::Session&& sample, const dds::WriterKey&) { push(std::move(sample)); });
+  hear<wire::Digests>(dds::digests_topic());
+  hear<wire::Status>(dds::status_topic());
+  hear<wire::Session>(dds::session_topic());
+}
+
+template <class T>
+void DdsSource::hear(const dds::Topic& topic) {
+  readers_.push_back(std::make_shared<dds::Reader<T>>(
+      participant_, topic, [this](T&& sample, const dds::WriterKey&) { push(std::move(sample)); }));
 }
 
 void DdsSource::push(dds::Report report) {

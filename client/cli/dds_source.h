@@ -3,8 +3,10 @@
 
 #include <condition_variable>
 #include <deque>
+#include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "client/cli/report_source.h"
 #include "common/dds/participant.h"
@@ -21,19 +23,15 @@ class DdsSource final : public ReportSource {
   std::optional<dds::Report> next(std::chrono::milliseconds at_most) override;
 
  private:
+  template <class T>
+  void hear(const dds::Topic& topic);
   void push(dds::Report report);
 
   dds::Participant participant_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<dds::Report> queue_;
-  std::optional<dds::Reader<wire::StateChunk>> states_;
-  std::optional<dds::Reader<wire::Poses>> poses_;
-  std::optional<dds::Reader<wire::LogEntry>> log_;
-  std::optional<dds::Reader<wire::Control>> control_;
-  std::optional<dds::Reader<wire::Digests>> digests_;
-  std::optional<dds::Reader<wire::Status>> status_;
-  std::optional<dds::Reader<wire::Session>> session_;
+  std::vector<std::shared_ptr<void>> readers_;  // of all kinds; they push, and nobody asks them anything
 };
 
 }  // namespace soda::cli
