@@ -14,7 +14,7 @@
 
 #include "common/dds/participant.h"
 #include "common/ids.h"
-#include "server/world/session_host.h"
+#include "server/world/session_listener.h"
 
 namespace soda::world {
 

@@ -1,22 +1,16 @@
 // The session service on the network: world 0's side.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
 #include "common/dds/participant.h"
+#include "server/world/session_listener.h"
 #include "server/world/session_service.h"
 
 namespace soda::world {
-
-// What a world hears of its session.
-struct SessionListener {
-  std::function<void(const wire::Control&)> control;
-  std::function<void(const wire::LogEntry&)> entry;
-};
 
 class SessionHost {
  public:
