@@ -34,12 +34,9 @@ void add_target(CLI::App& command, Target& target) {
   dds::add_network_options(command, target.network);
 }
 
+// Throws std::invalid_argument for a name that no session has.
 int ask(const Target& target, wire::Request request, const std::function<void(const wire::Answer&)>& say) {
-  if (!dds::good_session_name(target.session)) {
-    std::fprintf(stderr, "error: --session: 1 to 64 letters, digits, dots, dashes and underscores, not '%s'\n",
-                 target.session.c_str());
-    return kExitBadInput;
-  }
+  dds::check_session_name(target.session);
   try {
     const auto answer = Requester(target.network, target.session).ask(std::move(request), kPatience);
     if (!answer) {
@@ -84,7 +81,7 @@ class ActionCommand {
     add_target(command_, state_->target);
     command_.callback([state = state_, &exit_code] {
       for (const auto& apply : state->apply) apply(state->action);
-      exit_code = act(state->target, state->action);
+      exit_code = guarded([&] { return act(state->target, state->action); });
     });
   }
 

@@ -114,9 +114,7 @@ std::vector<std::string> arguments(const LaunchOptions& o, double dt, WorldId wo
 void check(LaunchOptions& o) {
   o.named = !o.session.empty();
   if (!o.named) o.session = new_session_name();
-  if (!dds::good_session_name(o.session))
-    throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" + o.session +
-                                "'");
+  dds::check_session_name(o.session);
   (void)parse_pace(o.pace);
   if (o.single()) {
     if (!o.start.empty()) throw std::invalid_argument("--start: there is only one world with --sync single");

@@ -19,9 +19,7 @@ struct WatchOptions {
 };
 
 int watch(const WatchOptions& options) {
-  if (!dds::good_session_name(options.session))
-    throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" +
-                                options.session + "'");
+  dds::check_session_name(options.session);
   StopSignals signals;
   Collector collector(options.follow.files);
   Table table(options.follow.quiet);

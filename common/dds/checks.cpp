@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <stdexcept>
 
 #include "common/actions/action.h"
 #include "common/body_state.h"
@@ -227,6 +228,11 @@ bool good_session_name(const std::string& name) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' ||
            c == '_';
   });
+}
+
+void check_session_name(const std::string& name) {
+  if (!good_session_name(name))
+    throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" + name + "'");
 }
 
 }  // namespace soda::dds

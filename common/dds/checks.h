@@ -47,5 +47,7 @@ std::string problem(const wire::Transforms& s);
 // Whether a name may be a session's: 1 to 64 letters, digits, dots, dashes and underscores. (It becomes a DDS
 // partition, in which * and ? would match others.)
 bool good_session_name(const std::string& name);
+// Throws std::invalid_argument, in the words of the option --session, unless it is one.
+void check_session_name(const std::string& name);
 
 }  // namespace soda::dds

@@ -40,9 +40,7 @@ std::uint64_t parse_hash(const std::string& text) {
 }
 
 void check(const Options& o) {
-  if (!dds::good_session_name(o.session))
-    throw std::invalid_argument("--session: 1 to 64 letters, digits, dots, dashes and underscores, not '" + o.session +
-                                "'");
+  dds::check_session_name(o.session);
   const bool has_scene = !o.scene.empty() || o.scene_fd >= 0;
   if (o.world == 0 && !has_scene) throw std::invalid_argument("--scene: world 0 needs one");
   if (o.world != 0 && has_scene)

@@ -202,6 +202,8 @@ TEST(Wire, SessionNamesAreNoPatterns) {
   EXPECT_TRUE(good_session_name("Demo_1.a-b"));
   for (const char* const bad : {"", "*", "a?", "a b", "ä", "a/b", "[ab]"}) EXPECT_FALSE(good_session_name(bad)) << bad;
   EXPECT_FALSE(good_session_name(std::string(65, 'a')));
+  EXPECT_NO_THROW(check_session_name("demo"));
+  EXPECT_THROW(check_session_name("a/b"), std::invalid_argument);
 }
 
 class Pipe {
