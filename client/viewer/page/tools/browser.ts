@@ -1,0 +1,39 @@
+// For tools that look at the page: the mock gateway as a process, and Debian's chromium without a window, which draws
+// WebGL in software.
+import { spawn, type ChildProcess } from 'node:child_process';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { chromium, type Browser, type Page } from 'playwright-core';
+
+const root = dirname(dirname(fileURLToPath(import.meta.url)));
+
+export async function startMock(port: number, args: string[]): Promise<ChildProcess> {
+  const child = spawn(process.execPath, [join(root, 'node_modules/tsx/dist/cli.mjs'), join(root, 'tools/mock.ts'), '--port', String(port), ...args], {
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
+  await new Promise<void>((resolve, reject) => {
+    child.stdout!.on('data', () => resolve());
+    child.on('exit', (code) => reject(new Error(`the mock ended with ${code}`)));
+  });
+  return child;
+}
+
+export async function startBrowser(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+    args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--hide-scrollbars'],
+  });
+}
+
+// A page that says what went wrong in it.
+export async function openPage(browser: Browser, url: string, width: number, height: number, dark: boolean, problems: string[]): Promise<Page> {
+  const context = await browser.newContext({ viewport: { width, height }, colorScheme: dark ? 'dark' : 'light' });
+  const page = await context.newPage();
+  page.on('console', (message) => {
+    if (message.type() === 'error' || message.type() === 'warning') problems.push(`${message.type()}: ${message.text()}`);
+  });
+  page.on('pageerror', (error) => problems.push(`exception: ${error.message}\n${error.stack}`));
+  await page.goto(url);
+  await page.waitForFunction(() => window.soda?.bodiesDrawn() > 0, null, { timeout: 60_000 });
+  return page;
+}

@@ -1,0 +1,215 @@
+// A gateway without a session: `npm run mock` serves dist/ and talks to the page as `soda view` does, about bodies that
+// it makes up. For work on the page; see mock --help.
+import { create, fromBinary, type MessageInitShape } from '@bufbuild/protobuf';
+import { readFile } from 'node:fs/promises';
+import { createServer } from 'node:http';
+import { dirname, extname, join, normalize } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { parseArgs } from 'node:util';
+import { WebSocketServer } from 'ws';
+import {
+  AnswerSchema, BodyListSchema, ClocksSchema, EndedSchema, EventsSchema, FromPageSchema, RollbackSchema, WelcomeSchema,
+  WorldsSchema, WorldStateSchema, type Do, type ToPage,
+} from '../src/gen/viewer_pb';
+import { protocol } from '../src/model/session';
+import { Client } from './mock/client';
+import { boxMesh, capsuleMesh, makeScene, sphereMesh } from './mock/scenes';
+import { ahead, dt, lead, Simulation } from './mock/simulation';
+
+const { values: options } = parseArgs({
+  options: {
+    help: { type: 'boolean', default: false },
+    port: { type: 'string', default: '8089' },
+    bodies: { type: 'string', default: '1000' },
+    worlds: { type: 'string', default: '4' },
+    scene: { type: 'string', default: 'city' }, // or cubes
+    token: { type: 'string', default: 'mock' },
+    plain: { type: 'boolean', default: false }, // all bodies grey
+    trouble: { type: 'boolean', default: false }, // world 1 falls behind, then silent, for some seconds at a time
+    replay: { type: 'boolean', default: false },
+    gather: { type: 'string', default: '0' }, // s until the run begins
+    end: { type: 'string', default: '0' }, // s until the session ends; 0: never
+  },
+});
+if (options.help) {
+  console.log('mock [--port N] [--bodies N] [--worlds N] [--scene city|cubes] [--token T] [--plain] [--trouble] [--replay] [--gather S] [--end S]');
+  process.exit(0);
+}
+
+const worlds = Number(options.worlds);
+const bodies = Number(options.bodies);
+const scene = makeScene(options.scene, bodies, worlds, options.plain);
+for (const size of [0.25, 0.5, 1]) scene.meshes.push(boxMesh(size, size, size), sphereMesh(size / 2), capsuleMesh(size / 2, size));
+const spawnMeshes = scene.meshes.length - 9;
+const simulation = new Simulation(scene, bodies > 4000 ? 120 : 400);
+const clients = new Set<Client>();
+let paused = false;
+let pace = 1;
+let extra = 0; // steps to do while paused
+const began = performance.now();
+const seconds = () => (performance.now() - began) / 1000;
+const gathering = () => seconds() < Number(options.gather);
+const redone = new Array<number>(worlds).fill(0);
+const rollbacks = new Array<number>(worlds).fill(0);
+const tell = (what: ToPage['what']) => clients.forEach((client) => client.send(what));
+
+// A world that is in trouble for 8 of 20 seconds: first behind, then silent.
+const troubled = (w: number) => options.trouble && w === 1 && seconds() % 20 > 8;
+const silent = (w: number) => troubled(w) && seconds() % 20 > 14;
+function clocksOf(w: number): { clock: bigint; front: bigint; final: bigint; silent: boolean } {
+  const wave = Math.sin(seconds() * (0.7 + 0.13 * w) + w) * 0.5 + 0.5;
+  const back = troubled(w) ? 26 : 0;
+  const clock = simulation.displayed + Math.round(10 + (ahead - 10) * wave);
+  const final = simulation.displayed + Math.round(-3 + (lead + 2) * Math.sin(seconds() * 1.7 + 2 * w) ** 2) - back;
+  const front = Math.round(final + (clock - final) * 0.7);
+  return { clock: BigInt(clock), front: BigInt(front), final: BigInt(Math.max(0, final)), silent: silent(w) };
+}
+const finalOf = () => Math.min(...Array.from({ length: worlds }, (_, w) => Number(clocksOf(w).final)));
+
+function clocks(): void {
+  tell({
+    case: 'clocks',
+    value: create(ClocksSchema, {
+      displayed: BigInt(simulation.displayed), pace, paused, gathering: gathering(),
+      speed: paused ? 0 : (pace || 3) * (options.trouble && seconds() % 20 > 12 ? 0.6 : 1),
+      oldest: BigInt(simulation.oldest), newest: BigInt(simulation.newest), final: BigInt(finalOf()),
+      world: Array.from({ length: worlds }, (_, w) => clocksOf(w)),
+    }),
+  });
+}
+
+function worldStates(): void {
+  const owned = new Array<number>(worlds).fill(0);
+  const state = simulation.state(simulation.displayed)!;
+  for (let i = 0; i < state.there.length; i++) if (state.there[i]) owned[simulation.ownerOf(state, i)]!++;
+  const world = owned.map((count, w): MessageInitShape<typeof WorldStateSchema> => ({
+    host: 'mock', pid: 1000 + w,
+    state: gathering() ? (w < worlds / 2 ? 'ready' : 'unknown') : silent(w) ? 'silent' : 'running',
+    bodies: BigInt(count), cells: BigInt(scene.owners.filter((o) => o === w).length), neighbours: worlds - 1,
+    waitingFor: troubled(w) ? -1 : options.trouble && troubled(1) ? 1 : seconds() % 3 < 1 ? (w + 1) % worlds : -1,
+    stepsPerSecond: 60 * pace, load: Math.min(1, 0.25 + count / bodies + 0.15 * Math.sin(seconds() + w) + (troubled(w) ? 0.4 : 0)),
+    waiting: 0.1 + 0.08 * Math.sin(seconds() * 0.6 + w), syncs: BigInt(simulation.displayed * 3), mixedIslands: 5n,
+    rollbacks: BigInt(rollbacks[w]!), bodiesRedone: BigInt(redone[w]!), refused: 0n,
+    lead: clocksOf(w).clock - clocksOf(w).final, bytesPerSecond: 2.1e5 * (1 + w), memory: BigInt(180e6 + 12e6 * w), cpu: 0.6,
+  }));
+  tell({ case: 'worlds', value: create(WorldsSchema, { world }) });
+}
+
+function rollback(world: number, step: number, steps: number, count: number): void {
+  rollbacks[world]!++;
+  redone[world]! += count;
+  tell({ case: 'rollback', value: create(RollbackSchema, { world, step: BigInt(step), steps, bodies: BigInt(count), milliseconds: 0.3 + count / 40 }) });
+}
+
+// Now and then something near a border turns out otherwise.
+function someRollback(): void {
+  const state = simulation.state(simulation.displayed)!;
+  const w = Math.floor(Math.random() * worlds);
+  let count = 0;
+  for (let i = Math.floor(Math.random() * 40); i < state.there.length && count < 60; i += 1 + Math.floor(Math.random() * 8)) {
+    if (!state.there[i] || state.asleep[i] || simulation.ownerOf(state, i) !== w || !(simulation.flagsOf(state, i, w) & 2)) continue;
+    simulation.redone.set(i, simulation.displayed + 2);
+    count++;
+  }
+  if (count) rollback(w, simulation.displayed + 2, 3 + Math.floor(Math.random() * 12), count * 4);
+}
+
+function handle(client: Client, request: Do): void {
+  const { number, what } = request;
+  const answer = (init: MessageInitShape<typeof AnswerSchema>) => client.send({ case: 'answer', value: create(AnswerSchema, { number, ...init }) });
+  if (!client.mayAct && !options.replay) return answer({ accepted: false, reason: 'this link has no token' });
+  if (what.case === 'pause') paused = true;
+  else if (what.case === 'resume') paused = false;
+  else if (what.case === 'speed') pace = what.value;
+  else if (what.case === 'steps') extra += Number(what.value);
+  else if (what.case === 'seek') simulation.displayed = Math.min(simulation.newest - ahead, Math.max(simulation.oldest, Number(what.value)));
+  else if (what.case === 'action') {
+    const done = simulation.act(what.value);
+    if (done.reason !== undefined) return answer({ accepted: false, reason: done.reason });
+    if (done.body) {
+      const body = scene.bodies[done.index]!;
+      const kind = what.value.kind.case === 'spawn' ? what.value.kind.value.body?.shape[0]?.kind.case : undefined;
+      const nearest = body.half < 0.19 ? 0 : body.half < 0.38 ? 1 : 2;
+      body.mesh = spawnMeshes + 3 * nearest + (kind === 'sphere' ? 1 : kind === 'capsule' ? 2 : 0);
+      tell({ case: 'bodies', value: bodyList(done.index) });
+    }
+    answer({ accepted: true, step: BigInt(done.step), body: done.body, logged: done.logged });
+    const state = simulation.state(done.step)!;
+    rollback(simulation.ownerOf(state, done.index), done.step, done.steps, done.steps);
+    return;
+  }
+  answer({ accepted: true, step: BigInt(simulation.displayed) });
+}
+
+function bodyList(first: number): MessageInitShape<typeof BodyListSchema> & { $typeName: 'soda.view.BodyList' } {
+  const list = scene.bodies.slice(first);
+  return create(BodyListSchema, {
+    first, id: list.map((b) => b.id), mesh: list.map((b) => b.mesh), colour: list.map((b) => b.colour), mass: list.map((b) => b.mass),
+  });
+}
+
+const dist = join(dirname(fileURLToPath(import.meta.url)), '../dist');
+const types: Record<string, string> = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css' };
+const server = createServer((request, response) => {
+  const path = normalize(new URL(request.url ?? '/', 'http://mock').pathname);
+  const file = join(dist, path === '/' ? 'index.html' : path);
+  readFile(file).then(
+    (data) => response.writeHead(200, { 'content-type': types[extname(file)] ?? 'application/octet-stream' }).end(data),
+    () => response.writeHead(404).end(),
+  );
+});
+new WebSocketServer({ server, path: '/ws' }).on('connection', (socket, request) => {
+  const token = new URL(request.url ?? '/', 'http://mock').searchParams.get('token');
+  const client = new Client(socket, token === options.token);
+  client.send({
+    case: 'welcome',
+    value: create(WelcomeSchema, {
+      protocol, version: 'mock', session: options.replay ? 'mock.rec' : 'mock', scene: `${scene.name}, ${bodies} bodies`, replay: options.replay, mayAct: client.mayAct,
+      dt, worlds, lastStep: 100000n, window: ahead, lead, grid: scene.grid, meshes: scene.meshes, statics: scene.statics,
+      low: scene.low, high: scene.high, gravity: [0, 0, scene.gravity],
+    }),
+  });
+  client.send({ case: 'bodies', value: bodyList(0) });
+  clients.add(client);
+  socket.on('close', () => clients.delete(client));
+  socket.on('message', (data: Buffer) => {
+    const { what } = fromBinary(FromPageSchema, new Uint8Array(data));
+    if (what.case === 'shown') client.confirmed = what.value.number;
+    if (what.case === 'look') {
+      client.held = what.value.which.case === 'step' ? Number(what.value.which.value) : null;
+      client.offset = what.value.which.case === 'offset' ? Number(what.value.which.value) : 0;
+    }
+    if (what.case === 'do') handle(client, what.value);
+  });
+});
+
+let due = performance.now();
+setInterval(() => {
+  const now = performance.now();
+  for (let k = 0; due < now && k < 4; k++) {
+    due += (1000 * dt) / (pace || 3);
+    if (gathering() || (paused && extra === 0)) continue;
+    if (paused) extra--;
+    simulation.advance();
+  }
+  due = Math.max(due, now - 100);
+  const final = finalOf();
+  clients.forEach((client) => client.frame(simulation, final));
+  for (const [body, until] of simulation.redone) if (until < simulation.displayed || paused) simulation.redone.delete(body);
+}, 4);
+setInterval(clocks, 50);
+setInterval(worldStates, 500);
+setInterval(() => !paused && !gathering() && Math.random() < 0.5 && someRollback(), 300);
+let wasSilent = false;
+setInterval(() => {
+  if (silent(1) === wasSilent) return;
+  wasSilent = silent(1);
+  tell({ case: 'events', value: create(EventsSchema, { text: [wasSilent ? 'world 1 fell silent' : 'world 1 is back'] }) });
+}, 200);
+if (Number(options.end) > 0)
+  setTimeout(() => {
+    tell({ case: 'ended', value: create(EndedSchema, { reason: 'All steps are done.', failed: false }) });
+    setTimeout(() => process.exit(0), 300);
+  }, 1000 * Number(options.end));
+
+server.listen(Number(options.port), '127.0.0.1', () => console.log(`mock gateway: http://127.0.0.1:${options.port}/?token=${options.token}`));
