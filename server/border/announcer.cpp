@@ -34,7 +34,7 @@ void Announcer::update(Step step) {
   if (changed.empty() || books_.empty()) return;
   std::vector<NearBodies> added(books_.size());
   for (const timeline::Slot slot : changed) {
-    const timeline::Ref<timeline::Record> record = context_.timeline.share(step, slot);
+    const Ref<timeline::Record> record = context_.timeline.share(step, slot);
     if (!record || (record->place.inside && record->place.owner == context_.settings.me)) continue;
     context_.neighbourhood.hearers(record->body, hearers_);
     for (std::size_t l = 0; l < books_.size(); ++l)

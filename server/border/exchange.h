@@ -21,7 +21,7 @@ struct KeptIsland {
                    // must confirm
     kSolved,
   };
-  timeline::Ref<timeline::Island> island;
+  Ref<timeline::Island> island;
   std::shared_ptr<const Component> component;
   std::vector<Aabb> boxes;  // reach boxes of its own bodies
   bool shared = false;      // has foreign or wide bodies

@@ -15,7 +15,7 @@ namespace soda::border {
 // A body that a neighbour owns or has near, with those of its contact records that can matter to it.
 struct NearBody {
   timeline::Slot slot = 0;
-  timeline::Ref<timeline::Record> record;
+  Ref<timeline::Record> record;
   std::vector<bool> wanted;  // contact records, by position; empty: all
 };
 using NearBodies = std::vector<NearBody>;  // ascending by slot

@@ -284,14 +284,15 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   std::vector<WorldId> waiting_for() const {
-    std::set<WorldId> worlds;
-    for (const Link& link : links_)
-      if (link.final_step() < final_ || link.upto() < std::min(timeline_.newest(), settings_.last_step))
-        worlds.insert(link.peer());
-    // Whoever's part is missing may have it from somebody else: all neighbours are asked.
-    if (worlds.empty() && !(final_ == settings_.last_step && context_.near_final(final_)))
-      for (const Link& link : links_) worlds.insert(link.peer());
-    return {worlds.begin(), worlds.end()};
+    std::vector<WorldId> worlds, others;
+    for (const Link& link : links_) {
+      const bool behind = link.final_step() < final_ || link.upto() < std::min(timeline_.newest(), settings_.last_step);
+      (behind ? worlds : others).push_back(link.peer());
+    }
+    // A part that is missing, or word that it is final, may have to come from somebody else: all neighbours are asked.
+    if (context_.near_final(final_) && (worlds.empty() ? final_ < settings_.last_step : !settler_.all_final(final_)))
+      worlds.insert(worlds.end(), others.begin(), others.end());
+    return worlds;
   }
 
   std::string why_not_final() const {
@@ -363,7 +364,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     for (const Part& part : message.parts) bounded(part.step, "part");
     for (const FinalPart& part : message.finals) bounded(part.step, "final part");
 
-    std::vector<timeline::Ref<timeline::NearSet>> sets;
+    std::vector<Ref<timeline::NearSet>> sets;
     for (const Frame& frame : message.frames) {
       sets.push_back(timeline_.near_set(frame.set));
       for (const timeline::NearSet::Body& b : sets.back()->bodies) check_body(*b.record);
@@ -467,6 +468,11 @@ Step WorldCore::final_step() const { return impl_->final_; }
 const std::vector<WorldId>& WorldCore::neighbours() const { return impl_->neighbourhood_.neighbours(); }
 std::vector<WorldId> WorldCore::waiting_for() const { return impl_->waiting_for(); }
 std::string WorldCore::why_not_final() const { return impl_->why_not_final(); }
+Step WorldCore::oldest() const { return impl_->timeline_.oldest(); }
+const Table<timeline::Record>& WorldCore::states(Step step) const { return impl_->timeline_.states(step); }
+bool WorldCore::touches_foreign(Step step, timeline::Slot slot) const {
+  return impl_->timeline_.touches_foreign(step, slot);
+}
 std::size_t WorldCore::own_bodies() const { return impl_->timeline_.count(impl_->timeline_.newest()); }
 std::size_t WorldCore::own_cells() const { return impl_->neighbourhood_.own_cells(); }
 const CoreStats& WorldCore::stats() const { return impl_->stats(); }

@@ -65,6 +65,7 @@ class Produced {
   std::size_t bodies() const { return timeline_.count(step_); }
   std::uint64_t hash() const { return timeline_.hash(step_); }  // bodies_hash
   BodySet all() const { return timeline_.all_produced(step_); }
+  const Table<timeline::Record>& states() const { return timeline_.states(step_); }
 
  private:
   const timeline::Timeline& timeline_;
@@ -128,8 +129,14 @@ class WorldCore {
   Step front() const;       // everything up to this step is computed, and nothing of it is to be done again
   Step final_step() const;  // newest step that can never change
   const std::vector<WorldId>& neighbours() const;
-  std::vector<WorldId> waiting_for() const;  // neighbours whose messages the next piece of work lacks
+  // Neighbours whose messages the next piece of work lacks, or may lack: those first who are behind.
+  std::vector<WorldId> waiting_for() const;
   std::string why_not_final() const;         // what the next final step lacks, in words, for logs
+  // ---- for those who watch: what this world produced at a step from oldest() to clock(), final or not
+  Step oldest() const;
+  const Table<timeline::Record>& states(Step step) const;
+  bool touches_foreign(Step step, timeline::Slot slot) const;
+
   std::size_t own_bodies() const;            // bodies whose centre lies in the territory at the clock
   std::size_t own_cells() const;
   const CoreStats& stats() const;

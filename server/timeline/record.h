@@ -8,7 +8,7 @@
 #include "common/body_state.h"
 #include "common/contact_record.h"
 #include "common/ids.h"
-#include "server/timeline/ref.h"
+#include "common/ref.h"
 
 namespace soda::timeline {
 

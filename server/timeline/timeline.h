@@ -24,7 +24,7 @@
 #include "server/timeline/marks.h"
 #include "server/timeline/record.h"
 #include "server/timeline/spatial_index.h"
-#include "server/timeline/table.h"
+#include "common/table.h"
 
 namespace soda::timeline {
 
@@ -123,6 +123,13 @@ class Timeline {
   std::size_t count(Step step) const { return at(step).count; }
   std::uint64_t hash(Step step) const { return at(step).hash; }
   BodySet all_produced(Step step) const;
+  // All of that as it is now; a copy costs next to nothing, and keeps the records alive.
+  const Table<Record>& states(Step step) const { return at(step).produced; }
+  // Whether it was found at `step` to touch bodies of others, directly or through its own.
+  bool touches_foreign(Step step, Slot slot) const {
+    const Island* const island = at(step).islands.get(slot);
+    return island && !island->foreign.empty();
+  }
   // f(record) for every body that this world produced at `step` and that is another's there.
   template <typename F>
   void for_each_departed(Step step, F&& f) const {

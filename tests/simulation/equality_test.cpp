@@ -113,6 +113,16 @@ TEST(WideBodies, APartOnceFinalStaysSo) {
   EXPECT_EQ(run_scenario(scenario).failure, "");
 }
 
+// Word that a part is final was lost on its way from a neighbour that is not behind itself. (Once only those who were
+// behind were asked again, and all stood still for ever.)
+TEST(LostMessages, AreAskedForOfAllNeighbours) {
+  const Scenario scenario = scenario_of(10455);
+  EXPECT_EQ(scenario.scene, "sleeping_chain") << "seeds mean something else now: without the mend, which one fails?";
+  const SessionResult got = run_scenario(scenario);
+  EXPECT_EQ(got.failure, "");
+  EXPECT_GT(got.lost, 0u);
+}
+
 TEST(Sleep, NothingIsSentForWhatSleeps) {
   const Scene scene = still_row();
   const SessionResult slept = run_session(scene, 4, 400, {});

@@ -2,6 +2,7 @@
 // Two levels of pages, copied on write.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -10,9 +11,9 @@
 #include <vector>
 
 #include "common/prefetch.h"
-#include "server/timeline/ref.h"
+#include "common/ref.h"
 
-namespace soda::timeline {
+namespace soda {
 
 template <class T>
 class Table {
@@ -29,6 +30,9 @@ class Table {
     const Page* page = group->pages[slot / kPageSlots % kGroupPages].get();
     return page ? page->slots[slot % kPageSlots].get() : nullptr;
   }
+
+  // Whether nothing has been set in either since one was a copy of the other. If not, they may still be equal.
+  bool same_as(const Table& other) const { return groups_ == other.groups_; }
 
   void set(Slot slot, Ref<T> object) {
     Item item{slot, std::move(object)};
@@ -56,6 +60,27 @@ class Table {
         page = std::move(fresh);
       }
       for (std::size_t i = first; i < end; ++i) page->slots[items[i].first % kPageSlots] = std::move(items[i].second);
+    }
+  }
+
+  // f(slot, const T* before, const T* now) for each slot in which `now` refers to another object than `before`,
+  // ascending; null where there is none. What they share costs nothing.
+  template <typename F>
+  static void for_each_difference(const Table& before, const Table& now, F&& f) {
+    for (std::size_t g = 0; g < std::max(before.groups_.size(), now.groups_.size()); ++g) {
+      const Group* const from = g < before.groups_.size() ? before.groups_[g].get() : nullptr;
+      const Group* const to = g < now.groups_.size() ? now.groups_[g].get() : nullptr;
+      if (from == to) continue;
+      for (std::size_t p = 0; p < kGroupPages; ++p) {
+        const Page* const old_page = from ? from->pages[p].get() : nullptr;
+        const Page* const new_page = to ? to->pages[p].get() : nullptr;
+        if (old_page == new_page) continue;
+        for (std::size_t s = 0; s < kPageSlots; ++s) {
+          const T* const l = old_page ? old_page->slots[s].get() : nullptr;
+          const T* const r = new_page ? new_page->slots[s].get() : nullptr;
+          if (l != r) f(static_cast<Slot>((g * kGroupPages + p) * kPageSlots + s), l, r);
+        }
+      }
     }
   }
 
@@ -112,4 +137,4 @@ class Table {
   std::vector<Ref<Group>> groups_;
 };
 
-}  // namespace soda::timeline
+}  // namespace soda

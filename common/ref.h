@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace soda::timeline {
+namespace soda {
 
 // T has a member `std::uint32_t references`, 0 when new, and a function release(T*) that is found for it.
 template <class T>
@@ -35,4 +35,4 @@ class Ref {
   T* object_ = nullptr;
 };
 
-}  // namespace soda::timeline
+}  // namespace soda
