@@ -76,15 +76,15 @@ class Client {
                    shown_.emplace(displayed_, Clock::now());
                    changed_.notify_all();
                  }),
-        transforms_(
-            participant_, dds::transforms_topic(),
-            [this](wire::Transforms&& sample, const dds::WriterKey&) {
-              const std::lock_guard lock(mutex_);
-              for (const wire::Transform& t : sample.bodies())
-                if (t.id() == body_ && sample.step() >= step_ && step_ > 0 && t.linear_velocity()[2] > kSpeed / 2)
-                  seen_.emplace(sample.step(), Clock::now());
-              changed_.notify_all();
-            }),
+        transforms_(participant_, dds::transforms_topic(),
+                    [this](wire::Transforms&& sample, const dds::WriterKey&) {
+                      const std::lock_guard lock(mutex_);
+                      const auto at = std::find(sample.ids().begin(), sample.ids().end(), body_) - sample.ids().begin();
+                      if (at < std::ssize(sample.ids()) && sample.step() >= step_ && step_ > 0 &&
+                          sample.velocities()[6 * at + 2] > kSpeed / 2)
+                        seen_.emplace(sample.step(), Clock::now());
+                      changed_.notify_all();
+                    }),
         requests_(participant_, dds::request_topic()) {}
 
   bool wait_running(std::chrono::seconds at_most) {

@@ -106,6 +106,7 @@ SODA_WIRE_TYPE(Digests)
 SODA_WIRE_TYPE(StateChunk)
 SODA_WIRE_TYPE(Poses)
 SODA_WIRE_TYPE(Transforms)
+SODA_WIRE_TYPE(Lack)
 #undef SODA_WIRE_TYPE
 
 }  // namespace soda::dds

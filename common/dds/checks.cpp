@@ -18,8 +18,6 @@ namespace {
 
 using eprosima::fastcdr::Cdr;
 
-constexpr std::size_t kTransformBytes = 8 + (3 + 4 + 3 + 3) * 8 + 4;  // the last one in a sequence: no padding after it
-
 template <class Field>
 void skip_one(Cdr& cdr) {
   Field field{};
@@ -43,6 +41,9 @@ bool pass_sequence(Cdr& cdr) {
 
 bool ok_text(const std::string& text) { return text.size() <= kMaxText && text.find('\0') == std::string::npos; }
 bool ok_step(std::int64_t step) { return step >= 0 && step <= kMaxStepNumber; }
+bool finite(const auto& values) {
+  return std::all_of(values.begin(), values.end(), [](auto v) { return std::isfinite(v); });
+}
 bool ok_seconds(double seconds) { return std::isfinite(seconds) && seconds >= 0; }
 
 }  // namespace
@@ -57,6 +58,7 @@ template bool lengths_fit<wire::Admission>(Cdr&);
 template bool lengths_fit<wire::Control>(Cdr&);
 template bool lengths_fit<wire::Answer>(Cdr&);
 template bool lengths_fit<wire::Status>(Cdr&);
+template bool lengths_fit<wire::Lack>(Cdr&);
 
 template <>
 bool lengths_fit<wire::SceneChunk>(Cdr& cdr) {
@@ -102,10 +104,10 @@ bool lengths_fit<wire::Poses>(Cdr& cdr) {
 
 template <>
 bool lengths_fit<wire::Transforms>(Cdr& cdr) {
-  skip<std::uint64_t, std::uint32_t, std::int64_t, double>(cdr);
-  std::uint32_t length = 0;
-  cdr >> length;
-  return cdr.jump(length * kTransformBytes);
+  skip<std::uint64_t, std::uint32_t, std::uint64_t, std::uint8_t, std::int64_t, double, std::int64_t, std::int64_t,
+       std::int64_t>(cdr);
+  return pass_sequence<std::uint64_t>(cdr) && pass_sequence<double>(cdr) && pass_sequence<float>(cdr) &&
+         pass_sequence<float>(cdr) && pass_sequence<std::uint8_t>(cdr) && pass_sequence<std::uint64_t>(cdr);
 }
 
 std::string problem(const wire::Session& s) {
@@ -175,7 +177,8 @@ std::string problem(const wire::Status& s) {
   if (s.state() > wire::STATE_DONE) return "unknown state";
   if (!ok_text(s.host())) return "overlong text";
   if (!ok_step(s.clock()) || !ok_step(s.final_step()) || s.final_step() > s.clock()) return "impossible step";
-  for (double seconds : {s.work_seconds(), s.waiting_seconds(), s.paced_seconds(), s.cpu_seconds()})
+  if (!ok_step(s.repair_step())) return "impossible step";
+  for (double seconds : {s.work_seconds(), s.waiting_seconds(), s.paced_seconds(), s.cpu_seconds(), s.repair_seconds()})
     if (!ok_seconds(seconds)) return "impossible time";
   return "";
 }
@@ -205,23 +208,24 @@ std::string problem(const wire::Poses& s) {
   if (!ok_step(s.step())) return "impossible step";
   if (s.ids().size() > kMaxPoses || s.ids().size() > s.total() || s.values().size() != 7 * s.ids().size())
     return "bad lengths";
-  if (!std::all_of(s.values().begin(), s.values().end(), [](float v) { return std::isfinite(v); }))
-    return "a value that is not finite";
-  return "";
+  return finite(s.values()) ? "" : "a value that is not finite";
 }
 
 std::string problem(const wire::Transforms& s) {
   if (s.world() >= kMaxWorlds) return "impossible world";
-  if (!ok_step(s.step()) || !ok_seconds(s.time())) return "impossible step";
-  const auto finite = [](const auto& values) {
-    return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-  };
-  for (const wire::Transform& t : s.bodies())
-    if (!finite(t.position()) || !finite(t.orientation()) || !finite(t.linear_velocity()) ||
-        !finite(t.angular_velocity()))
-      return "a value that is not finite";
-  return "";
+  if (s.number() == 0) return "no number";
+  if (s.kind() > wire::VIEW_AGAIN) return "unknown kind";
+  if (!ok_step(s.step()) || !ok_step(s.front()) || !ok_step(s.final_step()) || !ok_seconds(s.time()))
+    return "impossible step";
+  const std::size_t n = s.ids().size();
+  if (s.positions().size() != 3 * n || s.orientations().size() != 4 * n || s.velocities().size() != 6 * n ||
+      s.flags().size() != n)
+    return "bad lengths";
+  return finite(s.positions()) && finite(s.orientations()) && finite(s.velocities()) ? ""
+                                                                                     : "a value that is not finite";
 }
+
+std::string problem(const wire::Lack& s) { return s.world() < kMaxWorlds ? "" : "impossible world"; }
 
 bool good_session_name(const std::string& name) {
   return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](unsigned char c) {

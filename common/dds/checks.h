@@ -43,6 +43,7 @@ std::string problem(const wire::Digests& s);
 std::string problem(const wire::StateChunk& s);
 std::string problem(const wire::Poses& s);
 std::string problem(const wire::Transforms& s);
+std::string problem(const wire::Lack& s);
 
 // Whether a name may be a session's: 1 to 64 letters, digits, dots, dashes and underscores. (It becomes a DDS
 // partition, in which * and ? would match others.)

@@ -489,6 +489,7 @@ SODA_WIRE_NAME(Digests)
 SODA_WIRE_NAME(StateChunk)
 SODA_WIRE_NAME(Poses)
 SODA_WIRE_NAME(Transforms)
+SODA_WIRE_NAME(Lack)
 #undef SODA_WIRE_NAME
 
 }  // namespace soda::dds

@@ -55,13 +55,15 @@ Topic states_topic() { return {"soda/states", all(32, Millis(1000))}; }
 
 Topic poses_topic() { return {"soda/poses", all(256, Millis(1000))}; }
 
-// A slow viewer misses steps; nobody waits for it.
+// A viewer that is too slow misses samples and says so; nobody waits for it.
 Topic transforms_topic() {
   Topic topic{"soda/transforms", newest(kManyWorlds)};
-  topic.flow.keep_last = 8;
-  topic.flow.max_samples = 8 * kManyWorlds;
+  topic.flow.keep_last = 32;
+  topic.flow.max_samples = 32 * kManyWorlds;
   return topic;
 }
+
+Topic lack_topic() { return {"soda/lack", all(256, Millis(100))}; }
 
 // The core keeps what was not acknowledged by the neighbour's core and sends it again when asked, so that this history
 // only has to hold what is under way. A write must not hold up the loop, which then treats the connection as

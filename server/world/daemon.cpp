@@ -44,8 +44,9 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
       reports_(reports),
       model_(std::move(scene)),
       map_(bisect(model_.scene(), make_grid(model_.scene()), settings.worlds)),
-      recorder_(settings.instance, settings.me, model_.scene().dt, settings.dump_first, settings.dump_last,
-                settings.pose_every, reports) {
+      feed_(settings.instance, settings.me, model_.scene().dt, reports),
+      recorder_(settings.instance, settings.me, settings.dump_first, settings.dump_last, settings.pose_every, reports,
+                feed_) {
   border::CoreSettings core;
   core.me = settings.me;
   core.epoch = settings.epoch;
@@ -211,6 +212,12 @@ wire::Status Daemon::status() const {
   s.bodies_redone(stats.timeline.bodies_redone);
   s.rollbacks(stats.timeline.steps_redone);
   s.longest_rollback(stats.timeline.longest_rollback);
+  const RepairMeter::Repair& repair = repairs_.newest();
+  s.repairs(repairs_.count());
+  s.repair_step(repair.step);
+  s.repair_steps(static_cast<std::uint32_t>(repair.steps));
+  s.repair_bodies(repair.bodies);
+  s.repair_seconds(seconds(repair.work));
   s.interruptions(interruptions_);
   s.work_seconds(seconds(working_));
   s.waiting_seconds(seconds(waiting_));
@@ -267,12 +274,15 @@ Daemon::End Daemon::run() {
     // Before the start nobody may have been told anything: a seat may still change hands.
     Progress progress = Progress::kWaiting;
     if (limit_known_ >= 0) {
+      const Step front = core_->front();
       progress = core_->work();
       send_all();
+      repairs_.worked(front, *core_, Clock::now() - before);
     }
     const auto now = Clock::now();
     working_ += now - before;
     report_if_due(now);
+    feed_.report(*core_, progress != Progress::kWorked, now);
     if (state_ == wire::STATE_PREPARING && transport_.connected() && reports_.listened_to())
       report_status(wire::STATE_READY, now);
     if (progress == Progress::kDone) {

@@ -17,8 +17,10 @@
 #include "server/physics/model.h"
 #include "server/world/pacer.h"
 #include "server/world/recorder.h"
+#include "server/world/repair_meter.h"
 #include "server/world/reports.h"
 #include "server/world/transport.h"
+#include "server/world/view_feed.h"
 
 namespace soda::world {
 
@@ -80,6 +82,7 @@ class Daemon {
   Reports& reports_;
   physics::Model model_;
   TerritoryMap map_;
+  ViewFeed feed_;
   Recorder recorder_;
   std::unique_ptr<border::WorldCore> core_;
   std::vector<Line> lines_;  // by position in core_->neighbours()
@@ -98,6 +101,7 @@ class Daemon {
   Step status_final_ = 0;
   std::uint64_t interruptions_ = 0;
   std::uint64_t refusals_ = 0;
+  RepairMeter repairs_;
   Clock::duration working_{}, waiting_{}, paced_{};
 };
 

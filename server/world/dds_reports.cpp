@@ -18,13 +18,19 @@ void write_surely(dds::Writer<T>& writer, const T& sample, const std::function<b
 
 }  // namespace
 
-DdsReports::DdsReports(dds::Participant& participant, bool supervised, bool with_states, bool with_poses,
-                       std::function<bool()> give_up)
+DdsReports::DdsReports(dds::Participant& participant, std::uint64_t instance, WorldId me, bool supervised,
+                       bool with_states, bool with_poses, std::function<bool()> give_up)
     : supervised_(supervised),
       give_up_(std::move(give_up)),
       status_(participant, dds::status_topic()),
       digests_(participant, dds::digests_topic()),
-      transforms_(participant, dds::transforms_topic()) {
+      transforms_(participant, dds::transforms_topic(),
+                  [this](int change) {
+                    if (change > 0) lack_.store(true);
+                  }),
+      lacks_(participant, dds::lack_topic(), [this, instance, me](wire::Lack&& lack, const dds::WriterKey&) {
+        if (lack.instance() == instance && lack.world() == me) lack_.store(true);
+      }) {
   if (with_states) states_ = std::make_unique<dds::Writer<wire::StateChunk>>(participant, dds::states_topic());
   if (with_poses) poses_ = std::make_unique<dds::Writer<wire::Poses>>(participant, dds::poses_topic());
 }

@@ -28,6 +28,7 @@ class PipeReports final : public Reports {
   void control(const wire::Control& sample) { write(sample); }
   void entry(const wire::LogEntry& sample) { write(sample); }
   bool wants_transforms() const override { return false; }
+  bool take_lack() override { return false; }
   void transforms(const wire::Transforms&) override {}
   bool finish(std::chrono::milliseconds) override { return true; }  // what is in the pipe stays there
 

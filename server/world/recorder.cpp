@@ -33,15 +33,15 @@ std::span<const T> take(std::span<const T>& rest, std::size_t& room) {
 
 }  // namespace
 
-Recorder::Recorder(std::uint64_t instance, WorldId me, double dt, Step dump_first, Step dump_last, Step pose_every,
-                   Reports& reports)
+Recorder::Recorder(std::uint64_t instance, WorldId me, Step dump_first, Step dump_last, Step pose_every,
+                   Reports& reports, ViewFeed& feed)
     : instance_(instance),
       me_(me),
-      dt_(dt),
       dump_first_(dump_first),
       dump_last_(dump_last),
       pose_every_(pose_every),
-      reports_(reports) {
+      reports_(reports),
+      feed_(feed) {
   batch_.instance(instance);
   batch_.world(me);
 }
@@ -56,7 +56,7 @@ void Recorder::finalised(Step step, const border::Produced& produced) {
   if (batch_.hashes().size() >= kBatchSteps) flush();
   if (dump_first_ >= 0 && step >= dump_first_ && step <= dump_last_) report_state(step, produced.all());
   if (pose_every_ > 0 && step % pose_every_ == 0) report_poses(step, produced.all());
-  if (reports_.wants_transforms()) report_transforms(step, produced.all());
+  feed_.finalised(step, produced);
 }
 
 void Recorder::flush_if_due(Clock::time_point now) {
@@ -116,26 +116,6 @@ void Recorder::report_poses(Step step, const BodySet& produced) {
     if (end == moved.size()) break;
   }
   std::erase_if(posed_, [&](const auto& entry) { return entry.second.first != step; });
-}
-
-void Recorder::report_transforms(Step step, const BodySet& produced) {
-  wire::Transforms sample;
-  sample.instance(instance_);
-  sample.world(me_);
-  sample.step(step);
-  sample.time(static_cast<double>(step) * dt_);
-  sample.bodies().resize(produced.bodies.size());
-  for (std::size_t i = 0; i < produced.bodies.size(); ++i) {
-    const BodyState& body = produced.bodies[i];
-    wire::Transform& t = sample.bodies()[i];
-    t.id(body.id);
-    std::copy_n(body.position, 3, t.position().begin());
-    std::copy_n(body.orientation, 4, t.orientation().begin());
-    std::copy_n(body.linear_velocity, 3, t.linear_velocity().begin());
-    std::copy_n(body.angular_velocity, 3, t.angular_velocity().begin());
-    t.flags(body.flags);
-  }
-  reports_.transforms(sample);
 }
 
 }  // namespace soda::world

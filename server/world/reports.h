@@ -20,6 +20,8 @@ class Reports {
   virtual void state(const wire::StateChunk& sample) = 0;
   virtual void poses(const wire::Poses& sample) = 0;
   virtual bool wants_transforms() const = 0;
+  // Whether somebody has begun to read transforms, or said that some are lacking, since the last call.
+  virtual bool take_lack() = 0;
   virtual void transforms(const wire::Transforms& sample) = 0;
   // Blocks until everything has been acknowledged, or the time is up: false.
   virtual bool finish(std::chrono::milliseconds at_most) = 0;

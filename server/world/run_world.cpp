@@ -198,8 +198,8 @@ int run_host(const Options& options, StopSignals& signals) {
   EncodedScene scene = scene_of(options);
   const wire::Session session = describe(options, scene);
   dds::Participant participant(options.network, options.session, "soda-world-0");
-  DdsReports reports(participant, options.supervised_by != 0, session.dump_first() >= 0, session.pose_every() > 0,
-                     [&] { return signals.received() != 0; });
+  DdsReports reports(participant, session.instance(), options.world, options.supervised_by != 0,
+                     session.dump_first() >= 0, session.pose_every() > 0, [&] { return signals.received() != 0; });
   DdsTransport transport(participant, options.world);
   const auto shared = std::make_shared<const Scene>(scene.scene);
   std::vector<WantedAction> actions = actions_of(options, *shared);
@@ -287,7 +287,8 @@ int run_guest(const Options& options, StopSignals& signals) {
   spdlog::info("admitted to session '{}' as world {} of {}", options.session, options.world, session.worlds());
   Scene scene = decode_scene(admitted->encoded_scene, "the scene of session '" + options.session + "'");
   admitted->encoded_scene = {};
-  DdsReports reports(participant, session.watched(), session.dump_first() >= 0, session.pose_every() > 0, stop);
+  DdsReports reports(participant, session.instance(), options.world, session.watched(), session.dump_first() >= 0,
+                     session.pose_every() > 0, stop);
   DdsTransport transport(participant, options.world);
   Daemon daemon(std::move(scene), settings_of(session, options), transport, reports);
   // The guest outlives the daemon, and must not talk to it then, whatever happens.

@@ -56,8 +56,14 @@ wire::StateChunk good_state() {
 wire::Transforms good_transforms() {
   wire::Transforms s;
   s.world(1);
-  s.bodies().resize(3);
-  s.bodies()[2].id(17);
+  s.number(3);
+  s.kind(wire::VIEW_STEP);
+  s.ids({4, 9, 17});
+  s.positions(std::vector<double>(9, 0.5));
+  s.orientations(std::vector<float>(12, 0.5f));
+  s.velocities(std::vector<float>(18, 0.25f));
+  s.flags({1, 2, 3});
+  s.gone({5});
   return s;
 }
 
@@ -181,7 +187,12 @@ TEST(Wire, ImpossibleValuesAreRefused) {
   refused(good_digests(), [](auto& s) { s.world(kMaxWorlds); });
   refused(good_state(), [](auto& s) { s.bodies().resize(119); });
   refused(good_state(), [](auto& s) { s.bodies_total(0); });
-  refused(good_transforms(), [](auto& s) { s.bodies()[1].position()[2] = std::numeric_limits<double>::infinity(); });
+  refused(good_transforms(), [](auto& s) { s.positions()[5] = std::numeric_limits<double>::infinity(); });
+  refused(good_transforms(), [](auto& s) { s.velocities()[17] = std::numeric_limits<float>::quiet_NaN(); });
+  refused(good_transforms(), [](auto& s) { s.orientations().pop_back(); });
+  refused(good_transforms(), [](auto& s) { s.flags().pop_back(); });
+  refused(good_transforms(), [](auto& s) { s.kind(3); });
+  refused(good_transforms(), [](auto& s) { s.number(0); });
   refused(good_border(), [](auto& s) { s.to(kMaxWorlds); });
   refused(good_session(), [](auto& s) { s.lead(0); });
   refused(good_poses(), [](auto& s) { s.ids().pop_back(); });

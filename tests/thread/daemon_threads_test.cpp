@@ -59,7 +59,8 @@ class LedgerReports final : public Reports {
   void state(const wire::StateChunk&) override {}
   void poses(const wire::Poses&) override {}
   bool wants_transforms() const override { return true; }
-  void transforms(const wire::Transforms& sample) override { transforms_ += sample.bodies().size(); }
+  bool take_lack() override { return false; }
+  void transforms(const wire::Transforms& sample) override { transforms_ += sample.ids().size(); }
   bool finish(std::chrono::milliseconds) override { return true; }
 
  private:

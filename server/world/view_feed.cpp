@@ -1,0 +1,125 @@
+#include "server/world/view_feed.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace soda::world {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kEvery = 4ms;
+constexpr auto kWholeEvery = 250ms;  // whoever loses samples because there are too many must not make for more
+
+std::int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+ViewFeed::ViewFeed(std::uint64_t instance, WorldId me, double dt, Reports& reports)
+    : instance_(instance), me_(me), dt_(dt), reports_(reports) {
+  sample_.instance(instance);
+  sample_.world(me);
+}
+
+void ViewFeed::finalised(Step step, const border::Produced& produced) {
+  if (!watched_) return;
+  if (finals_.empty()) first_final_ = step;
+  finals_.push_back(produced.states());
+}
+
+void ViewFeed::report(const border::WorldCore& core, bool rest, Clock::time_point now) {
+  if (!rest && now - reported_ < kEvery) return;
+  reported_ = now;
+  watched_ = reports_.wants_transforms();
+  if (!watched_) {
+    told_.clear();
+    finals_.clear();
+    return;
+  }
+  if (core.clock() < 0) return;
+  anew_ = reports_.take_lack() || anew_;
+  if (anew_ && now - whole_ >= kWholeEvery) {
+    anew_ = false;
+    told_.clear();
+  }
+  if (told_.empty()) {
+    whole_ = now;
+    finals_.clear();
+  }
+  tell_all(core);
+}
+
+void ViewFeed::tell_all(const border::WorldCore& core) {
+  const Step front = core.front();
+  const auto states = [&](Step step) -> const States& {
+    return step < core.oldest() ? finals_.at(static_cast<std::size_t>(step - first_final_)) : core.states(step);
+  };
+  if (told_.empty()) {
+    first_told_ = core.oldest();
+    told_.push_back(core.states(first_told_));
+    tell(wire::VIEW_WHOLE, first_told_, States(), told_.back(), core);
+  }
+  // What is told of first_told_ is final.
+  for (Step step = first_told_ + 1; step <= front; ++step) {
+    const auto at = static_cast<std::size_t>(step - first_told_);
+    if (at < told_.size()) {
+      if (told_[at].same_as(states(step))) continue;
+      const States before = std::exchange(told_[at], states(step));
+      tell(wire::VIEW_AGAIN, step, before, told_[at], core);
+    } else {
+      told_.push_back(states(step));
+      tell(wire::VIEW_STEP, step, told_[at - 1], told_[at], core);
+    }
+  }
+  // Nothing changes in a final step; the newest is what the next one is compared with.
+  while (told_.size() > 1 && first_told_ < core.final_step()) {
+    told_.pop_front();
+    ++first_told_;
+  }
+  while (!finals_.empty() && first_final_ < first_told_) {
+    finals_.pop_front();
+    ++first_final_;
+  }
+  // A repair under way, or news of finality, are news, too.
+  if (front != front_told_ || core.final_step() != final_told_)
+    tell(wire::VIEW_AGAIN, first_told_, told_.front(), told_.front(), core);
+}
+
+void ViewFeed::tell(std::uint8_t kind, Step step, const States& before, const States& now,
+                    const border::WorldCore& core) {
+  sample_.number(++number_);
+  sample_.kind(kind);
+  sample_.step(step);
+  sample_.time(static_cast<double>(step) * dt_);
+  sample_.front(front_told_ = core.front());
+  sample_.final_step(final_told_ = core.final_step());
+  sample_.computed(now_ns());
+  sample_.ids().clear();
+  sample_.positions().clear();
+  sample_.orientations().clear();
+  sample_.velocities().clear();
+  sample_.flags().clear();
+  sample_.gone().clear();
+  States::for_each_difference(before, now, [&](timeline::Slot slot, const auto* old, const auto* record) {
+    if (!record) return sample_.gone().push_back(old->body.id);
+    const BodyState& body = record->body;
+    sample_.ids().push_back(body.id);
+    const auto add = [](auto& to, const double* values, int n) {
+      for (int i = 0; i < n; ++i) to.push_back(static_cast<typename std::decay_t<decltype(to)>::value_type>(values[i]));
+    };
+    add(sample_.positions(), body.position, 3);
+    add(sample_.orientations(), body.orientation, 4);
+    add(sample_.velocities(), body.linear_velocity, 3);
+    add(sample_.velocities(), body.angular_velocity, 3);
+    const bool mixed = step >= core.oldest() && core.touches_foreign(step, slot);
+    sample_.flags().push_back(static_cast<std::uint8_t>((body.asleep() ? wire::VIEW_ASLEEP : 0) |
+                                                        (record->place.inside ? 0 : wire::VIEW_NEAR) |
+                                                        (mixed ? wire::VIEW_MIXED : 0)));
+  });
+  reports_.transforms(sample_);
+}
+
+}  // namespace soda::world
