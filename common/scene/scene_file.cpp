@@ -1,17 +1,15 @@
 #include "common/scene/scene_file.h"
 
-#include <fcntl.h>
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/text_format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 
+#include "common/atomic_file.h"
 #include "common/scene/proto_text.h"
 
 namespace soda {
@@ -177,39 +175,12 @@ std::string read_file(const std::filesystem::path& path) {
 }
 
 void write_file(const std::filesystem::path& path, std::string_view bytes) {
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
-  // In the same folder, because a name can only be given within one file system.
-  std::string name = ".";
-  name += path.filename().string();
-  name += ".XXXXXX";
-  std::string temporary = (folder / name).string();
-  const auto fail = [&](const char* what) {
-    const std::string reason = std::string(what) + ": " + std::strerror(errno);
-    refuse(path.string(), reason);
-  };
-  const int file = ::mkstemp(temporary.data());
-  if (file < 0) fail("cannot be written");
-  const auto give_up = [&](const char* what) {
-    const int error = errno;
-    ::close(file);
-    ::unlink(temporary.c_str());
-    errno = error;
-    fail(what);
-  };
-  for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t n = ::write(file, bytes.data() + done, bytes.size() - done);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) give_up("cannot be written");
-    done += static_cast<std::size_t>(n);
-  }
-  const mode_t mask = ::umask(0);  // mkstemp makes private files; scenes are shared like any other
-  ::umask(mask);
-  if (::fchmod(file, 0666 & ~mask) != 0 || ::fsync(file) != 0) give_up("cannot be written");
-  if (::rename(temporary.c_str(), path.c_str()) != 0) give_up("cannot be given its name");
-  ::close(file);
-  if (const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY); directory >= 0) {
-    ::fsync(directory);
-    ::close(directory);
+  try {
+    AtomicFile file(path);
+    file.write(bytes);
+    file.commit();
+  } catch (const FileError& e) {
+    refuse(e.path.string(), e.reason);
   }
 }
 

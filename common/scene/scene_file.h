@@ -29,7 +29,7 @@ Scene decode_scene(std::string_view bytes, std::string_view source_name);
 std::string scene_to_text(const Scene& scene);
 Scene scene_from_text(std::string_view text, std::string_view source_name, const MeshLoader& mesh_loader = {});
 
-// Whole files, for scenes and what they refer to. Throw SceneError. write_file is the atomic writing of save_scene.
+// Whole files, for scenes and what they refer to. Throw SceneError. write_file writes as save_scene does (AtomicFile).
 std::string read_file(const std::filesystem::path& path);
 void write_file(const std::filesystem::path& path, std::string_view bytes);
 
