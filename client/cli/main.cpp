@@ -7,6 +7,7 @@
 
 #include "client/cli/act_command.h"
 #include "client/cli/diff_command.h"
+#include "client/cli/export_command.h"
 #include "client/cli/run_command.h"
 #include "client/cli/scene_command.h"
 #include "client/cli/verify_command.h"
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
   soda::cli::add_pace_commands(app, exit_code);
   soda::cli::add_diff_command(app, exit_code);
   soda::cli::add_verify_command(app, exit_code);
+  soda::cli::add_export_command(app, exit_code);
   soda::add_scene_command(app, exit_code);
   try {
     app.parse(argc, argv);
