@@ -11,6 +11,7 @@
 #include "client/cli/run_command.h"
 #include "client/cli/scene_command.h"
 #include "client/cli/verify_command.h"
+#include "client/cli/view_command.h"
 #include "client/cli/watch_command.h"
 #include "common/version.h"
 
@@ -39,6 +40,7 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   soda::cli::add_run_command(app, exit_code);
   soda::cli::add_watch_command(app, exit_code);
+  soda::cli::add_view_command(app, exit_code);
   soda::cli::add_act_command(app, exit_code);
   soda::cli::add_pace_commands(app, exit_code);
   soda::cli::add_diff_command(app, exit_code);
