@@ -10,6 +10,7 @@ packages=(
   libprotobuf-dev protobuf-compiler                         # scene files
   libsdformat-dev libassimp-dev libtinyxml2-dev             # SDF worlds and meshes
   libspdlog-dev libcli11-dev libxxhash-dev libzstd-dev      # logs, options, hashes, compression
+  libboost-dev                                              # the viewer's gateway (Beast)
   nlohmann-json3-dev                                        # exported files
   libgtest-dev libbenchmark-dev                             # tests and micro-benchmarks
   gnuplot-nox                                               # pictures

@@ -1,0 +1,58 @@
+// A session that runs, for the gateway.
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/buffer/session_client.h"
+#include "client/viewer/scene_model.h"
+#include "client/viewer/source.h"
+
+namespace soda::viewer {
+
+class LiveSource final : public Source {
+ public:
+  // `on_news` as for SessionClient. `history`: steps in the past that can be shown.
+  LiveSource(const dds::NetworkOptions& network, const std::string& session, Step history,
+             std::function<void()> on_news);
+
+  News poll() override;
+  bool ready() const override { return model_ != nullptr; }
+  view::Welcome welcome() const override;
+  std::uint32_t listed() const override { return static_cast<std::uint32_t>(bodies_.size()); }
+  view::BodyList bodies(std::uint32_t first, std::uint32_t& meshes) const override;
+  const buffer::TransformBuffer* buffer() const override { return client_.buffer(); }
+  Step displayed() const override { return client_.displayed(); }
+  view::Clocks clocks() const override;
+  view::Worlds worlds() override;
+  std::string ended() const override;
+  std::uint64_t ask(const view::Do& wanted) override;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Watched {  // of a world
+    wire::Status before;
+    Clock::time_point then{};
+    bool silent = false;
+    std::uint64_t repairs = 0;
+    bool known = false;
+  };
+  void watch_worlds(News& news);
+  void note_speed();
+  view::WorldState state_of(WorldId world, Clock::time_point now);
+
+  const std::string session_;
+  buffer::SessionClient client_;
+  std::unique_ptr<SceneModel> model_;
+  std::vector<BodyId> bodies_;  // by index, as far as their looks are known
+  std::size_t spawned_ = 0;     // bodies of the log that the model has
+  std::vector<Watched> watched_;
+  std::deque<std::pair<Clock::time_point, Step>> displayed_;  // of the last second
+};
+
+}  // namespace soda::viewer

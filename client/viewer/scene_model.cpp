@@ -1,0 +1,101 @@
+#include "client/viewer/scene_model.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+namespace soda::viewer {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "packed arrays are written as they are in memory");
+
+// A plane is shown as a square that reaches well beyond all bodies.
+TessellationOptions options_for(const Scene& scene) {
+  Eigen::AlignedBox3d box;
+  for (const Body& body : scene.bodies)
+    if (!body.is_static) box.extend(body.pose.position);
+  TessellationOptions options;
+  if (!box.isEmpty()) options.plane_edge = std::max(options.plane_edge, 4 * box.diagonal().norm());
+  return options;
+}
+
+template <class T>
+std::string packed(const std::vector<T>& values) {
+  std::string bytes(values.size() * sizeof(T), '\0');
+  if (!values.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
+  return bytes;
+}
+
+template <class List>
+void add_vector(List& list, const Vec3& v) {
+  for (int i = 0; i < 3; ++i) list.Add(v[i]);
+}
+
+}  // namespace
+
+SceneModel::SceneModel(const Scene& scene, WorldId worlds) : meshes_(options_for(scene)) {
+  welcome_.set_scene(scene.name);
+  welcome_.set_dt(scene.dt);
+  add_vector(*welcome_.mutable_gravity(), scene.gravity);
+  Eigen::AlignedBox3d box;
+  for (const Body& body : scene.bodies) {
+    const Looks what = looks(scene, body);
+    const Pose pose = display_pose(body);
+    if (!body.is_static) {
+      bodies_.emplace(body.id, what);
+      const Vec3 radius = Vec3::Constant(bounding_radius(scene, body));
+      box.extend(pose.position - radius);
+      box.extend(pose.position + radius);
+      continue;
+    }
+    view::Static& still = *welcome_.add_statics();
+    still.set_mesh(what.mesh);
+    add_vector(*still.mutable_position(), pose.position);
+    for (int i = 0; i < 4; ++i) still.add_orientation(pose.orientation.coeffs()[i]);
+    still.set_colour(what.colour);
+  }
+  if (box.isEmpty()) box.extend(Vec3::Zero());
+  add_vector(*welcome_.mutable_low(), box.min());
+  add_vector(*welcome_.mutable_high(), box.max());
+  if (worlds == 0) return;
+  const TerritoryMap map = bisect(scene, make_grid(scene), worlds);
+  view::Grid& grid = *welcome_.mutable_grid();
+  add_vector(*grid.mutable_origin(), map.grid.origin);
+  grid.set_edge(map.grid.edge);
+  for (const std::int32_t cells : map.grid.size) grid.add_size(cells);
+  for (const WorldId owner : map.owner) append(*grid.mutable_owner(), static_cast<std::uint16_t>(owner));
+}
+
+SceneModel::Looks SceneModel::looks(const Scene& scene, const Body& body) {
+  return {meshes_.index_of(scene, body), display_colour(body), body.inertial.mass};
+}
+
+void SceneModel::add(BodyId id, const Scene& shape) { bodies_.emplace(id, looks(shape, shape.bodies.front())); }
+
+void SceneModel::fill(view::Welcome& welcome) const {
+  welcome.MergeFrom(welcome_);
+  for (std::uint32_t number = 0; number < meshes(); ++number) add_mesh(number, *welcome.add_meshes());
+}
+
+void SceneModel::add_mesh(std::uint32_t number, view::Mesh& mesh) const {
+  const DisplayMesh& from = meshes_.meshes().at(number);
+  mesh.set_positions(packed(from.positions));
+  mesh.set_normals(packed(from.normals));
+  mesh.set_indices(packed(from.indices));
+  double radius = 0;
+  for (std::size_t v = 0; v < from.vertices(); ++v)
+    radius = std::max<double>(radius,
+                              std::hypot(from.positions[3 * v], from.positions[3 * v + 1], from.positions[3 * v + 2]));
+  mesh.set_radius(radius);
+}
+
+void SceneModel::list(BodyId id, view::BodyList& list) const {
+  const Looks& what = bodies_.at(id);
+  list.add_id(id);
+  list.add_mesh(what.mesh);
+  list.add_colour(what.colour);
+  list.add_mass(what.mass);
+}
+
+}  // namespace soda::viewer

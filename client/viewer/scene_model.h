@@ -1,0 +1,47 @@
+// A scene as pages are told it: meshes, bodies, what stands still, territories.
+#pragma once
+
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "common/ids.h"
+#include "common/scene/tessellation.h"
+#include "common/territory.h"
+#include "viewer.pb.h"
+
+namespace soda::viewer {
+
+class SceneModel {
+ public:
+  // `worlds` 0: there are no territories to show.
+  SceneModel(const Scene& scene, WorldId worlds);
+
+  void add(BodyId id, const Scene& shape);  // spawned: a scene of that body alone
+  bool has(BodyId id) const { return bodies_.contains(id); }
+
+  void fill(view::Welcome& welcome) const;  // scene, dt, gravity, box, grid, statics, the meshes so far
+  std::uint32_t meshes() const { return static_cast<std::uint32_t>(meshes_.meshes().size()); }
+  void add_mesh(std::uint32_t number, view::Mesh& mesh) const;
+  // Adds the body, which must be known, to the list.
+  void list(BodyId id, view::BodyList& list) const;
+
+ private:
+  struct Looks {
+    std::uint32_t mesh = 0, colour = 0;
+    double mass = 0;
+  };
+  Looks looks(const Scene& scene, const Body& body);
+
+  DisplayMeshTable meshes_;
+  std::unordered_map<BodyId, Looks> bodies_;
+  view::Welcome welcome_;  // all but meshes
+};
+
+// Little-endian arrays as they are in messages.
+template <class T>
+void append(std::string& bytes, const T& value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+}  // namespace soda::viewer
