@@ -1,7 +1,7 @@
 // The page's address: it says how the scene is looked at, so that a link shows another person the same. The token, which
 // is the right to act, is read from it and stays out of what is copied unless the user wants it in.
 import type { CameraState } from './draw/views';
-import { colourModes, type ColourBy, type SettingsStore, type Theme } from './settings';
+import { colourModes, type ColourBy, type Quality, type SettingsStore, type Theme } from './settings';
 
 const switches = { b: 'borders', n: 'near', m: 'mixed' } as const;
 const settle = 400; // ms without a change until the address is written
@@ -15,6 +15,7 @@ export class Link {
   constructor(
     private readonly settings: SettingsStore,
     private readonly cameraNow: () => CameraState,
+    moved: (camera: CameraState) => void, // by a link that is pasted over the open page
   ) {
     const hash = new URLSearchParams(location.hash.slice(1));
     const query = new URLSearchParams(location.search);
@@ -22,8 +23,11 @@ export class Link {
     this.token = query.get('token') ?? hash.get('token');
     this.read(hash);
     settings.onChange(() => this.changed());
-    // A link that is pasted over the open page.
-    window.addEventListener('hashchange', () => this.read(new URLSearchParams(location.hash.slice(1))));
+    window.addEventListener('hashchange', () => {
+      this.read(new URLSearchParams(location.hash.slice(1)));
+      if (this.camera) moved(this.camera);
+      this.camera = null;
+    });
   }
 
   changed(): void {
@@ -55,7 +59,7 @@ export class Link {
     const theme = hash.get('theme');
     if (theme === 'dark' || theme === 'light') this.settings.set('theme', theme as Theme);
     const quality = hash.get('quality');
-    if (quality === 'high' || quality === 'medium' || quality === 'low') this.settings.set('quality', quality);
+    if (quality) this.settings.set('quality', quality as Quality); // whatever else it says is not taken
   }
 
   private write(withToken: boolean): string {

@@ -29,7 +29,11 @@ const toasts = byId('toasts');
 const say = (text: string, kind: 'info' | 'bad' = 'info') => toast(toasts, text, kind);
 
 const settings = new SettingsStore();
-const link: Link = new Link(settings, () => picture.views.state());
+const link: Link = new Link(
+  settings,
+  () => picture.views.state(),
+  (camera) => picture.views.restore(camera),
+);
 const picture: Picture = new Picture(byId<HTMLCanvasElement>('view'), byId('labels'), settings, () => link.changed());
 const ticker = new Ticker(byId('ticker'));
 

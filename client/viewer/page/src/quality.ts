@@ -1,22 +1,22 @@
 // How finely the scene is drawn. Left to itself it begins well where there is graphics hardware, and goes down when
 // pictures come too slowly for some seconds.
+import type { LevelName } from './draw/looks';
 import type { SettingsStore } from './settings';
 
-type Level = 'high' | 'medium' | 'low';
-const lower: Record<Level, Level | null> = { high: 'medium', medium: 'low', low: null };
+const lower: Record<LevelName, LevelName | null> = { high: 'medium', medium: 'low', low: 'minimal', minimal: null };
 const tooSlow = 40; // pictures per second
 const patience = 4; // s
 
 export class QualityChooser {
-  level: Level;
+  level: LevelName;
   private slowFor = 0;
 
   constructor(
     private readonly settings: SettingsStore,
     software: boolean,
-    private readonly apply: (level: Level) => void,
+    private readonly apply: (level: LevelName) => void,
   ) {
-    const auto: Level = software ? 'low' : 'high';
+    const auto: LevelName = software ? 'low' : 'high';
     this.level = settings.now.quality === 'auto' ? auto : settings.now.quality;
     apply(this.level);
     settings.onChange((now, key) => {
@@ -33,7 +33,7 @@ export class QualityChooser {
     this.set(next);
   }
 
-  private set(level: Level): void {
+  private set(level: LevelName): void {
     this.slowFor = 0;
     this.level = level;
     this.apply(level);

@@ -5,7 +5,7 @@ export type Theme = 'auto' | 'dark' | 'light';
 export type ColourBy = 'body' | 'world' | 'speed' | 'sleep';
 export type Tool = 'select' | 'grab' | 'push' | 'spawn';
 export type SpawnShape = 'box' | 'sphere' | 'capsule';
-export type Quality = 'auto' | 'high' | 'medium' | 'low';
+export type Quality = 'auto' | 'high' | 'medium' | 'low' | 'minimal';
 
 export interface Settings {
   theme: Theme;
@@ -48,7 +48,7 @@ export const defaults: Settings = {
 // Values that a setting of words may have; whatever else is stored or linked is not taken.
 const words: { [K in keyof Settings]?: readonly string[] } = {
   theme: ['auto', 'dark', 'light'],
-  quality: ['auto', 'high', 'medium', 'low'],
+  quality: ['auto', 'high', 'medium', 'low', 'minimal'],
   colour: ['body', 'world', 'speed', 'sleep'],
   spawnShape: ['box', 'sphere', 'capsule'],
 };

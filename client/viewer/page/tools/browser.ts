@@ -25,15 +25,23 @@ export async function startBrowser(): Promise<Browser> {
   });
 }
 
-// A page that says what went wrong in it.
-export async function openPage(browser: Browser, url: string, width: number, height: number, dark: boolean, problems: string[]): Promise<Page> {
+// A page that says what went wrong in it. `pause`: ms between pictures; software is then not always behind with drawing,
+// and the rest of the page stays quick.
+export async function openPage(
+  browser: Browser, url: string, width: number, height: number, dark: boolean, problems: string[], pause = 0,
+): Promise<Page> {
   const context = await browser.newContext({ viewport: { width, height }, colorScheme: dark ? 'dark' : 'light' });
   const page = await context.newPage();
+  if (pause > 0)
+    await page.addInitScript((ms) => {
+      const native = window.requestAnimationFrame.bind(window);
+      window.requestAnimationFrame = (draw) => window.setTimeout(() => native(draw), ms);
+    }, pause);
   page.on('console', (message) => {
     if (message.type() === 'error' || message.type() === 'warning') problems.push(`${message.type()}: ${message.text()}`);
   });
   page.on('pageerror', (error) => problems.push(`exception: ${error.message}\n${error.stack}`));
   await page.goto(url);
-  await page.waitForFunction(() => window.soda?.bodiesDrawn() > 0, null, { timeout: 60_000 });
+  await page.waitForFunction(() => window.soda?.bodiesDrawn() > 0, null, { timeout: 240_000 });
   return page;
 }

@@ -9,7 +9,7 @@ import { parseArgs } from 'node:util';
 import { WebSocketServer } from 'ws';
 import {
   AnswerSchema, BodyListSchema, ClocksSchema, EndedSchema, EventsSchema, FromPageSchema, RollbackSchema, WelcomeSchema,
-  WorldsSchema, WorldStateSchema, type Do, type ToPage,
+  WorldsSchema, WorldStateSchema, type BodyList, type Do, type Mesh, type ToPage,
 } from '../src/gen/viewer_pb';
 import { protocol } from '../src/model/session';
 import { Client } from './mock/client';
@@ -39,8 +39,6 @@ if (options.help) {
 const worlds = Number(options.worlds);
 const bodies = Number(options.bodies);
 const scene = makeScene(options.scene, bodies, worlds, options.plain);
-for (const size of [0.25, 0.5, 1]) scene.meshes.push(boxMesh(size, size, size), sphereMesh(size / 2), capsuleMesh(size / 2, size));
-const spawnMeshes = scene.meshes.length - 9;
 const simulation = new Simulation(scene, bodies > 4000 ? 120 : 400);
 const clients = new Set<Client>();
 let paused = false;
@@ -127,11 +125,16 @@ function handle(client: Client, request: Do): void {
     const done = simulation.act(what.value);
     if (done.reason !== undefined) return answer({ accepted: false, reason: done.reason });
     if (done.body) {
-      const body = scene.bodies[done.index]!;
-      const kind = what.value.kind.case === 'spawn' ? what.value.kind.value.body?.shape[0]?.kind.case : undefined;
-      const nearest = body.half < 0.19 ? 0 : body.half < 0.38 ? 1 : 2;
-      body.mesh = spawnMeshes + 3 * nearest + (kind === 'sphere' ? 1 : kind === 'capsule' ? 2 : 0);
-      tell({ case: 'bodies', value: bodyList(done.index) });
+      const shape = what.value.kind.case === 'spawn' ? what.value.kind.value.body?.shape[0]?.kind : undefined;
+      const box = shape?.case === 'box' ? shape.value.size : undefined;
+      const radius = shape?.case === 'sphere' || shape?.case === 'capsule' ? shape.value.radius : 0.5;
+      const mesh =
+        shape?.case === 'sphere' ? sphereMesh(radius)
+        : shape?.case === 'capsule' ? capsuleMesh(radius, shape.value.length)
+        : boxMesh(box?.x ?? 1, box?.y ?? 1, box?.z ?? 1);
+      scene.bodies[done.index]!.mesh = scene.meshes.push(mesh) - 1;
+      tell({ case: 'bodies', value: bodyList(done.index, [mesh]) });
+      clients.forEach((each) => (each.anew = true));
     }
     answer({ accepted: true, step: BigInt(done.step), body: done.body, logged: done.logged });
     const state = simulation.state(done.step)!;
@@ -141,20 +144,22 @@ function handle(client: Client, request: Do): void {
   answer({ accepted: true, step: BigInt(simulation.displayed) });
 }
 
-function bodyList(first: number): MessageInitShape<typeof BodyListSchema> & { $typeName: 'soda.view.BodyList' } {
+function bodyList(first: number, meshes: Mesh[] = []): BodyList {
   const list = scene.bodies.slice(first);
   return create(BodyListSchema, {
-    first, id: list.map((b) => b.id), mesh: list.map((b) => b.mesh), colour: list.map((b) => b.colour), mass: list.map((b) => b.mass),
+    first, meshes, id: list.map((b) => b.id), mesh: list.map((b) => b.mesh), colour: list.map((b) => b.colour), mass: list.map((b) => b.mass),
   });
 }
 
 const dist = join(dirname(fileURLToPath(import.meta.url)), '../dist');
 const types: Record<string, string> = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css' };
+// Stricter than the gateway's, so that the page stays within it.
+const policy = "default-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws: wss:";
 const server = createServer((request, response) => {
   const path = normalize(new URL(request.url ?? '/', 'http://mock').pathname);
   const file = join(dist, path === '/' ? 'index.html' : path);
   readFile(file).then(
-    (data) => response.writeHead(200, { 'content-type': types[extname(file)] ?? 'application/octet-stream' }).end(data),
+    (data) => response.writeHead(200, { 'content-type': types[extname(file)] ?? 'application/octet-stream', 'content-security-policy': policy }).end(data),
     () => response.writeHead(404).end(),
   );
 });

@@ -16,6 +16,7 @@ const { values } = parseArgs({
     width: { type: 'string', default: '1440' },
     height: { type: 'string', default: '860' },
     wait: { type: 'string', default: '3' },
+    pause: { type: 'string', default: '2000' }, // ms between pictures
     eval: { type: 'string' },
   },
 });
@@ -25,13 +26,13 @@ const browser = await startBrowser();
 const problems: string[] = [];
 try {
   const url = `${values.url ?? `http://127.0.0.1:${port}/?token=mock`}#${values.hash}`;
-  const page = await openPage(browser, url, Number(values.width), Number(values.height), !values.light, problems);
+  const page = await openPage(browser, url, Number(values.width), Number(values.height), !values.light, problems, Number(values.pause));
   await page.waitForTimeout(1000);
   for (const key of values.keys.split(' ').filter(Boolean)) await page.keyboard.press(key);
   await page.waitForTimeout(1000 * Number(values.wait));
   if (values.eval) console.log(JSON.stringify(await page.evaluate(values.eval)));
   mkdirSync(values.out, { recursive: true });
-  await page.screenshot({ path: join(values.out, `${values.name}.png`), timeout: 120_000 });
+  await page.screenshot({ path: join(values.out, `${values.name}.png`), timeout: 280_000 });
   console.log(JSON.stringify(await page.evaluate(() => ({ fps: window.soda.fps(), ms: window.soda.frameMilliseconds(), drawn: window.soda.bodiesDrawn(), step: window.soda.step() }))));
 } finally {
   await browser.close();

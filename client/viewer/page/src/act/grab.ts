@@ -3,7 +3,7 @@
 import { create } from '@bufbuild/protobuf';
 import { Plane, Quaternion, Vector3, type Ray } from 'three';
 import { GrabSchema, MoveGrabSchema, ReleaseSchema } from '../gen/action_pb';
-import type { Requests } from '../net/requests';
+import { notConnected, type Requests } from '../net/requests';
 import { vec3 } from './spawning';
 
 const movesPerSecond = 30;
@@ -88,7 +88,13 @@ export class Grabbing {
     });
   }
 
-  private sendRelease(): void {
-    void this.requests.act({ case: 'release', value: create(ReleaseSchema, { grab: this.logged! }) });
+  // Until it has arrived: a spring that nobody lets go of would pull for ever.
+  private sendRelease(triesLeft = 30): void {
+    void this.requests
+      .act({ case: 'release', value: create(ReleaseSchema, { grab: this.logged! }) }, triesLeft < 30)
+      .then((answer) => {
+        if (!answer.accepted && answer.reason === notConnected && triesLeft > 0)
+          setTimeout(() => this.sendRelease(triesLeft - 1), 1000);
+      });
   }
 }

@@ -54,6 +54,7 @@ export class Tools {
         this.views.follow(hit.body);
       }
     });
+    window.addEventListener('pagehide', () => this.letGo());
     canvas.addEventListener('pointerleave', () => (this.marks.hovered = -1));
     canvas.addEventListener('contextmenu', (event) => event.preventDefault());
   }

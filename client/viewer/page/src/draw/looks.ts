@@ -20,10 +20,10 @@ export const looks: Record<'dark' | 'light', Look> = {
     horizon: 0x1d2735,
     nadir: 0x0b0f15,
     sky: 0x9db8dc,
-    ground: 0x4a4038,
-    ambient: 1.05,
+    ground: 0x5a5048,
+    ambient: 1.4,
     sun: 0xffead0,
-    sunlight: 2.5,
+    sunlight: 2.4,
     lines: 0x9fb4d0,
     lineStrength: 0.22,
     tint: 0.42,
@@ -45,15 +45,19 @@ export const looks: Record<'dark' | 'light', Look> = {
   },
 };
 
+export type LevelName = 'high' | 'medium' | 'low' | 'minimal';
+
 export interface Level {
   pixelRatio: number;
   shadows: number; // edge of the shadow map, 0: none
+  softShadows: boolean;
   fine: boolean; // highlights on bodies
   occlusion: boolean;
 }
 
-export const levels: Record<'high' | 'medium' | 'low', Level> = {
-  high: { pixelRatio: 2, shadows: 4096, fine: true, occlusion: true },
-  medium: { pixelRatio: 1.5, shadows: 2048, fine: true, occlusion: false },
-  low: { pixelRatio: 1, shadows: 1024, fine: false, occlusion: false },
+export const levels: Record<LevelName, Level> = {
+  high: { pixelRatio: 2, shadows: 4096, softShadows: true, fine: true, occlusion: true },
+  medium: { pixelRatio: 1.5, shadows: 2048, softShadows: true, fine: true, occlusion: false },
+  low: { pixelRatio: 1, shadows: 1024, softShadows: false, fine: false, occlusion: false },
+  minimal: { pixelRatio: 0.75, shadows: 0, softShadows: false, fine: false, occlusion: false },
 };

@@ -10,7 +10,7 @@ import { BodyColours } from './body_colours';
 import { bodyUniforms } from './body_material';
 import { Instances } from './instances';
 import { Labels } from './labels';
-import { levels, looks } from './looks';
+import { levels, looks, type LevelName } from './looks';
 import { Marks } from './marks';
 import { Occlusion } from './occlusion';
 import { Picker } from './pick';
@@ -43,7 +43,7 @@ export class Picture {
     private readonly settings: SettingsStore,
     cameraChanged: () => void,
   ) {
-    this.stage = new Stage(canvas);
+    this.stage = new Stage(canvas, settings.now.quality);
     const { scene, camera } = this.stage;
     this.views = new Views(camera, canvas, this.bodies, cameraChanged);
     this.statics = new Statics(scene);
@@ -93,6 +93,7 @@ export class Picture {
   }
 
   addBodies(list: BodyList): void {
+    for (const mesh of list.meshes) this.shapes.add(mesh);
     this.bodies.add(list);
   }
 
@@ -109,7 +110,7 @@ export class Picture {
     this.applySettings();
   }
 
-  setLevel(name: 'high' | 'medium' | 'low'): void {
+  setLevel(name: LevelName): void {
     this.stage.setLevel(levels[name]);
     this.instances.setFine(levels[name].fine);
     this.occlusion.enable(levels[name].occlusion);

@@ -2,6 +2,7 @@
 import {
   ACESFilmicToneMapping,
   BackSide,
+  BasicShadowMap,
   Color,
   DirectionalLight,
   Fog,
@@ -15,7 +16,9 @@ import {
   SphereGeometry,
   Vector3,
   WebGLRenderer,
+  type Material,
 } from 'three';
+import type { Quality } from '../settings';
 import { levels, looks, type Level, type Look } from './looks';
 
 export class Stage {
@@ -34,14 +37,12 @@ export class Stage {
   private radius = 20; // m, of the scene
   readonly focusPoint = new Vector3();
 
-  constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
-    const gl = this.renderer.getContext();
-    const info = gl.getExtension('WEBGL_debug_renderer_info');
-    const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-    this.software = /swiftshader|llvmpipe|software/i.test(name);
+  // Whether edges are smoothed can be said only now, so it is by what the user has chosen before.
+  constructor(readonly canvas: HTMLCanvasElement, quality: Quality) {
+    this.software = isSoftware();
+    const antialias = quality === 'auto' ? !this.software : quality === 'high' || quality === 'medium';
+    this.renderer = new WebGLRenderer({ canvas, antialias, powerPreference: 'high-performance' });
     this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = PCFSoftShadowMap;
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.sky = new Mesh(
       new SphereGeometry(1, 32, 16),
@@ -83,7 +84,6 @@ export class Stage {
 
   setExtent(radius: number): void {
     this.radius = Math.max(1, radius);
-    this.camera.near = Math.max(0.02, this.radius / 2000);
     this.camera.far = this.radius * 60 + 1000;
     this.camera.updateProjectionMatrix();
   }
@@ -108,6 +108,13 @@ export class Stage {
     this.level = level;
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, level.pixelRatio));
     const shadow = this.sun.shadow;
+    const type = level.softShadows ? PCFSoftShadowMap : BasicShadowMap;
+    if (this.renderer.shadowMap.type !== type) {
+      this.renderer.shadowMap.type = type;
+      this.scene.traverse((object) => {
+        if (object instanceof Mesh) (object.material as Material).needsUpdate = true;
+      });
+    }
     this.sun.castShadow = level.shadows > 0;
     if (level.shadows > 0 && shadow.mapSize.x !== level.shadows) {
       shadow.mapSize.set(level.shadows, level.shadows);
@@ -159,15 +166,31 @@ export class Stage {
     this.sun.position.copy(at).addScaledVector(this.toSun, depth);
     this.sun.target.updateMatrixWorld();
 
+    // Depths are told apart in proportion to the nearest: not nearer than is needed from here.
+    const near = Math.max(0.02, 0.012 * distance);
+    if (Math.abs(near - this.camera.near) > 0.1 * this.camera.near) {
+      this.camera.near = near;
+      this.camera.updateProjectionMatrix();
+    }
+
     this.sky.position.copy(this.camera.position);
     this.sky.scale.setScalar(this.camera.far * 0.5);
-    this.fog.near = distance * 0.9 + this.radius * 1.2;
-    this.fog.far = distance * 2.2 + this.radius * 7;
+    this.fog.near = distance + this.radius * 0.6;
+    this.fog.far = distance * 1.6 + this.radius * 4.5;
   }
 
   render(): void {
     this.renderer.render(this.scene, this.camera);
   }
+}
+
+// Asked of a context of its own, which is let go of at once.
+function isSoftware(): boolean {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  const info = gl?.getExtension('WEBGL_debug_renderer_info');
+  const name = gl && info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+  gl?.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
 }
 
 const skyVertex = /* glsl */ `

@@ -38,13 +38,13 @@ export class Views {
 
   // The whole scene, from a little above and aside.
   frameAll(): void {
-    this.following = null;
+    this.follow(null);
     const box = this.currentBox();
     const centre = box.low.clone().add(box.high).multiplyScalar(0.5);
     const up = this.camera.up;
     const aside = this.aside();
     const along = new Vector3().crossVectors(up, aside);
-    const direction = aside.multiplyScalar(-0.62).addScaledVector(along, -1).addScaledVector(up, 0.62).normalize();
+    const direction = aside.multiplyScalar(-0.55).addScaledVector(along, -1).addScaledVector(up, 0.56).normalize();
     this.camera.position.copy(centre).addScaledVector(direction, this.distanceFor(box.low, box.high, direction));
     this.controls.target.copy(centre);
     this.controls.update();
@@ -52,6 +52,7 @@ export class Views {
   }
 
   follow(body: number | null): void {
+    this.controls.zoomToCursor = body === null; // it would zoom away from what is followed
     this.following = body === null ? null : this.bodies.ids[body]!;
     if (body === null) return;
     const at = this.place(body);
@@ -127,10 +128,11 @@ export class Views {
   private distanceFor(low: Vector3, high: Vector3, direction: Vector3): number {
     const right = new Vector3().crossVectors(this.camera.up, direction).normalize();
     const above = new Vector3().crossVectors(direction, right);
-    const tall = Math.tan((this.camera.fov * Math.PI) / 360) * 0.84; // a margin for the bars
+    const tall = Math.tan((this.camera.fov * Math.PI) / 360) * 0.97;
     const wide = tall * this.camera.aspect;
     const half = high.clone().sub(low).multiplyScalar(0.5);
     let distance = 1;
+    // Corners of a box that is wide are empty mostly; they may lie at the rim of the picture.
     for (let k = 0; k < 8; k++) {
       const corner = new Vector3(k & 1 ? half.x : -half.x, k & 2 ? half.y : -half.y, k & 4 ? half.z : -half.z);
       const near = corner.dot(direction);

@@ -55,7 +55,7 @@ export class Playback {
     const difference = frame.step - this.newest;
     const stride = this.pacer.stride();
     const limit = frame.at < this.jumpUntil ? 2.5 * stride : Math.max(shortJump, 4 * stride);
-    const jump = !this.started || frame.whole || difference < 0 || difference > limit;
+    const jump = !this.started || difference < 0 || difference > limit;
     this.newest = frame.step;
     this.queue.push(frame);
     if (jump) {
@@ -116,7 +116,7 @@ export class Playback {
     if (this.jumped.length < bodies.mesh.length) this.jumped = new Uint8Array(bodies.mesh.length);
     if (frame.whole) this.keepOnly(known);
     for (const i of frame.gone) if (i < bodies.count && bodies.present[i]) this.vanish(i);
-    this.a = frame.whole ? frame.step : this.b;
+    this.a = Math.min(this.b, frame.step);
     this.b = frame.step;
     this.active = known;
     this.anticipated = frame.anticipated;
@@ -142,7 +142,8 @@ export class Playback {
       const dz = toPos[p + 2]! - fromPos[p + 2]!;
       const jumped = fresh || dx * dx + dy * dy + dz * dz > reach * reach;
       this.jumped[i] = jumped ? 1 : 0;
-      if (jumped) {
+      // What is new is there at once; what jumped stays until its frame is reached.
+      if (fresh) {
         for (let c = 0; c < 3; c++) pos[p + c] = fromPos[p + c] = toPos[p + c]!;
         for (let c = 0; c < 4; c++) rot[q + c] = fromRot[q + c] = toRot[q + c]!;
       }

@@ -6,7 +6,7 @@ import { FromPageSchema, ToPageSchema, type FromPage, type ToPage } from '../gen
 export type LinkState =
   | { kind: 'connecting' }
   | { kind: 'open' }
-  | { kind: 'broken'; retryAt: number } // ms, performance.now()
+  | { kind: 'broken'; retryAt: number; reason: string } // ms, performance.now(); what the gateway said, or ''
   | { kind: 'closed' }; // the session has ended
 
 const firstWait = 250; // ms
@@ -51,7 +51,7 @@ export class Connection {
       this.wait = firstWait; // it is a gateway, and it talks
       this.received(message);
     };
-    socket.onclose = () => {
+    socket.onclose = (event) => {
       clearTimeout(limit);
       if (this.socket !== socket) return;
       this.socket = null;
@@ -59,7 +59,7 @@ export class Connection {
         this.set({ kind: 'closed' });
         return;
       }
-      this.set({ kind: 'broken', retryAt: performance.now() + this.wait });
+      this.set({ kind: 'broken', retryAt: performance.now() + this.wait, reason: event.reason });
       this.timer = window.setTimeout(() => this.open(), this.wait);
       this.wait = Math.min(longestWait, 2 * this.wait);
     };

@@ -19,10 +19,12 @@ export interface AnswerRecord {
 interface Pending {
   asked: string;
   since: number;
+  quiet: boolean;
   resolve: (answer: Answer) => void;
 }
 
 const keep = 200;
+export const notConnected = 'there is no connection';
 
 export class Requests {
   readonly answers: AnswerRecord[] = [];
@@ -34,16 +36,17 @@ export class Requests {
     private readonly told: (record: AnswerRecord) => void,
   ) {}
 
-  act(kind: Action['kind']): Promise<Answer> {
-    return this.ask({ case: 'action', value: create(ActionSchema, { kind }) }, kind.case ?? 'nothing');
+  // `quiet`: a refusal is not worth a message.
+  act(kind: Action['kind'], quiet = false): Promise<Answer> {
+    return this.ask({ case: 'action', value: create(ActionSchema, { kind }) }, kind.case ?? 'nothing', quiet);
   }
 
-  ask(what: Do['what'], asked: string = what.case ?? 'nothing'): Promise<Answer> {
+  ask(what: Do['what'], asked: string = what.case ?? 'nothing', quiet = false): Promise<Answer> {
     const number = this.next++;
     return new Promise((resolve) => {
-      this.pending.set(number, { asked, since: performance.now(), resolve });
+      this.pending.set(number, { asked, since: performance.now(), quiet, resolve });
       if (!this.connection().send({ case: 'do', value: create(DoSchema, { number, what }) }))
-        this.refuse(number, 'there is no connection');
+        this.refuse(number, notConnected);
     });
   }
 
@@ -63,12 +66,12 @@ export class Requests {
     };
     this.answers.push(record);
     if (this.answers.length > keep) this.answers.shift();
-    this.told(record);
+    if (record.accepted || !of.quiet) this.told(record);
     of.resolve(answer);
   }
 
   lost(): void {
-    for (const number of [...this.pending.keys()]) this.refuse(number, 'the connection broke');
+    for (const number of [...this.pending.keys()]) this.refuse(number, notConnected);
   }
 
   private refuse(number: number, reason: string): void {

@@ -58,13 +58,16 @@ export class Banner {
       return {
         kind: 'bad',
         title: session.welcome ? 'The connection is lost' : 'The gateway does not answer',
-        text: `Next try in ${seconds} s. What you see is the last that was heard.`,
+        text: `${link.reason ? `The gateway says: ${link.reason}. ` : ''}Next try in ${seconds} s.${session.welcome ? ' What you see is the last that was heard.' : ''}`,
         button: { text: 'Try now', does: 'connect' },
       };
     }
     if (link.kind === 'connecting')
       return { kind: 'info', title: 'Connecting …', text: session.welcome ? 'to the session again' : 'to the session' };
-    if (!session.welcome) return { kind: 'info', title: 'Connected', text: 'Waiting for the scene …' };
+    if (!session.welcome)
+      return session.clocks?.gathering
+        ? { kind: 'info', title: 'The run has not begun', text: "Waiting for the session's worlds …" }
+        : { kind: 'info', title: 'Connected', text: 'Waiting for the scene …' };
     if (session.welcome.protocol !== protocol)
       return {
         kind: 'bad',

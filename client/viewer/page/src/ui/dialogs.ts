@@ -107,6 +107,7 @@ export function settingsDialog(settings: SettingsStore, host: SettingsHost): () 
       ['high', 'high'],
       ['medium', 'medium'],
       ['low', 'low'],
+      ['minimal', 'lowest'],
     ]),
     quality,
     box('redone', 'Flash bodies that were rolled back'),

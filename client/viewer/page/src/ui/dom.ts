@@ -12,6 +12,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   for (const [name, value] of Object.entries(props)) {
     if (value === undefined || value === false) continue;
     if (typeof value === 'function') element.addEventListener(name.slice(2), value);
+    else if (name === 'style') element.style.cssText = String(value); // the attribute would be forbidden as written in line
     else element.setAttribute(name, value === true ? '' : String(value));
   }
   for (const child of children) if (child !== null) element.append(child);

@@ -15,7 +15,7 @@ export function drawSpark(canvas: HTMLCanvasElement, ticks: Ticks, now: number, 
   let most = style.least;
   for (const v of ticks.value) most = Math.max(most, v);
   const x = (at: number) => width * (1 - (now - at) / ticks.seconds);
-  const y = (v: number) => height - 1.5 - (height - 4) * (Math.max(0, v) / most);
+  const y = (v: number) => height - 1.5 - (height - 13) * (Math.max(0, v) / most); // the name stands above
   context.strokeStyle = style.colour;
   context.globalAlpha = 0.18;
   context.beginPath();

@@ -6,7 +6,8 @@ import { css, worldColour } from '../draw/colours';
 import { h } from './dom';
 import { count, digits, plural } from './words';
 
-const lines = 7;
+const lines = 6;
+const stays = 20; // s
 const gather = 0.4; // s in which repairs of one world are one line
 const causedWithin = 3; // s after an answer in which a repair from its step on is the user's
 
@@ -63,7 +64,9 @@ export class Ticker {
   private line(text: string, kind: string, world = -1): HTMLElement {
     const words = h('span', {}, text);
     const dot = world >= 0 ? h('span', { class: 'dot', style: `background:${css(worldColour(world))}` }) : null;
-    this.root.append(h('div', { class: `line ${kind}` }, dot, words));
+    const line = h('div', { class: `line ${kind}` }, dot, words);
+    this.root.append(line);
+    setTimeout(() => line.remove(), 1000 * stays);
     while (this.root.children.length > lines) this.root.firstChild!.remove();
     return words;
   }

@@ -40,6 +40,7 @@ export class Timeline {
   private sliding = 0; // ms, until when the slider is the user's
   private paused = false;
   private seekTimer = 0;
+  private slowSince = 0;
 
   constructor(
     root: HTMLElement,
@@ -204,20 +205,31 @@ export class Timeline {
     } else if (clocks.paused) {
       kind = 'paused';
       text = 'paused';
-    } else if (clocks.pace > 0 && clocks.speed < 0.9 * clocks.pace && session.displayed > 30) {
+    } else if (this.isSlow(clocks.pace, clocks.speed)) {
       kind = 'slow';
-      text = `slow motion: ${digits(clocks.speed, 2)} × real time, ${digits(clocks.speed / clocks.pace, 2)} of what was asked for`;
-    } else if (clocks.pace !== 1) text += ` · ${digits(clocks.speed, 3)} × real time`;
+      // In twentieths, so that it is not another text (and read aloud) each time.
+      const share = Math.round((20 * clocks.speed) / clocks.pace) / 20;
+      text = `slow motion: ${digits(share, 2)} of the speed asked for`;
+    }
     if (clocks.paused && !live) text += ' (paused)';
     if (looking.held !== null && !live) text += ' (held)';
     this.state.dataset.kind = kind;
     setText(this.state, text);
     const step = session.displayed + difference;
     const dt = session.welcome?.dt ?? 0;
-    setText(this.stepText, `step ${count(step)} · ${clockTime(step * dt)} s · final ${count(session.final)}`);
+    const speed = clocks.paused ? '' : ` · ${digits(clocks.speed, 2)} × real time`;
+    setText(this.stepText, `step ${count(step)} · ${clockTime(step * dt)} s · final ${count(session.final)}${replay ? '' : speed}`);
     this.liveButton.disabled = live;
     this.liveButton.hidden = this.holdButton.hidden = replay;
     this.holdButton.setAttribute('aria-pressed', String(looking.held !== null));
+  }
+
+  // For some time: after a pause the speed of the last second is lower, too.
+  private isSlow(pace: number, speed: number): boolean {
+    const now = performance.now();
+    if (pace === 0 || speed >= 0.9 * pace || this.session.clocks?.paused) this.slowSince = 0;
+    else if (this.slowSince === 0) this.slowSince = now;
+    return this.slowSince > 0 && now - this.slowSince > 1500;
   }
 
   private updateRows(): void {

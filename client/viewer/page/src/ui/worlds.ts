@@ -77,7 +77,8 @@ export class WorldsPanel {
     setText(card.badge, trouble?.short ?? state?.state ?? '…');
     card.badge.title = trouble?.long ?? '';
     if (!state) return;
-    setText(card.brief, `${percent(state.load)} load · lead ${Number(state.lead)}`);
+    setText(card.brief, `${percent(state.load)} · +${Number(state.lead)}`);
+    card.brief.title = `load · lead: its clock is ${Number(state.lead)} steps beyond its final step`;
     const set = (name: string, text: string) => setText(card.values.get(name)!, text);
     set('clock', row ? count(row.clock) : '–');
     set('final', row ? count(row.final) : '–');

@@ -11,6 +11,7 @@ export class Client {
   offset = 0;
   held: number | null = null;
   confirmed = 0;
+  anew = true; // the next frame has everything
   private number = 0;
   private sentStep = -1;
   private sent = new Float32Array(0);
@@ -33,7 +34,8 @@ export class Client {
     const state = simulation.state(step);
     if (!state) return;
     const n = state.there.length;
-    const whole = this.number === 0;
+    const whole = this.anew;
+    this.anew = false;
     if (this.sent.length < n * 7) {
       const grow = <T extends Float32Array | Uint8Array>(old: T, size: number): T => {
         const larger = new (old.constructor as new (n: number) => T)(size);
