@@ -1,9 +1,18 @@
 #!/usr/bin/env bash
-# The demo of `make run`: a small city on some world daemons, watched in the terminal.
-#   demo.sh BIN_DIR [WORLDS] [BODIES] [SECONDS]
+# The demo of `make run`: a small city on some world daemons, shown in the browser, until Ctrl-C.
+#   demo.sh BIN_DIR [WORLDS] [BODIES] [PORT]
 set -euo pipefail
-bin=$1 worlds=${2:-4} bodies=${3:-3000} seconds=${4:-10}
-scene=$(mktemp -d)/demo.scene
-trap 'rm -rf "$(dirname "$scene")"' EXIT
-"$bin/soda" scene make demo --bodies "$bodies" --seed 1 -o "$scene"
-"$bin/soda" run "$scene" --worlds "$worlds" --steps $((seconds * 60)) --pace realtime
+bin=$1 worlds=${2:-4} bodies=${3:-3000} port=${4:-8080}
+folder=$(mktemp -d)
+session=demo-$$
+viewer=
+trap '[ -z "$viewer" ] || kill "$viewer" 2>/dev/null; rm -rf "$folder"' EXIT
+"$bin/soda" scene make demo --bodies "$bodies" --seed 1 -o "$folder/demo.scene"
+if [ -e "$bin/../share/soda/viewer/index.html" ]; then
+  "$bin/soda" view --session "$session" --port "$port" &
+  viewer=$!
+  sleep 1  # it says where it is to be seen, above the table
+else
+  echo "the viewer's page was not built (no Node.js 18): the demo is shown here only"
+fi
+"$bin/soda" run "$folder/demo.scene" --session "$session" --worlds "$worlds" --steps 100000000 --pace realtime

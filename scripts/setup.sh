@@ -12,6 +12,7 @@ packages=(
   libspdlog-dev libcli11-dev libxxhash-dev libzstd-dev      # logs, options, hashes, compression
   libboost-dev                                              # the viewer's gateway (Beast)
   nlohmann-json3-dev                                        # exported files
+  cyclonedds-dev cyclonedds-tools                           # tests: another vendor's DDS reads ours
   libgtest-dev libbenchmark-dev                             # tests and micro-benchmarks
   gnuplot-nox                                               # pictures
 )

@@ -29,7 +29,7 @@ std::uint64_t random_client() {
 }  // namespace
 
 SessionClient::SessionClient(const dds::NetworkOptions& network, const std::string& session, Step history,
-                             std::function<void()> on_news)
+                             std::function<void()> on_news, bool transforms)
     : client_(random_client()),
       history_(history),
       on_news_(std::move(on_news)),
@@ -41,7 +41,7 @@ SessionClient::SessionClient(const dds::NetworkOptions& network, const std::stri
   hear<wire::Status>(dds::status_topic());
   hear<wire::LogEntry>(dds::action_log_topic());
   hear<wire::Answer>(dds::answer_topic());
-  hear<wire::Transforms>(dds::transforms_topic());
+  if (transforms) hear<wire::Transforms>(dds::transforms_topic());
   hear<wire::Session>(dds::session_topic());
 }
 

@@ -40,9 +40,10 @@ class SessionClient {
   };
 
   // `on_news` is called from threads of DDS whenever something has come: to wake whoever will call poll().
-  // `history`: steps before the displayed one that are kept. Throws as dds::Participant.
+  // `history`: steps before the displayed one that are kept. Without `transforms` the buffer stays empty, and the
+  // worlds need not tell of bodies. Throws as dds::Participant.
   SessionClient(const dds::NetworkOptions& network, const std::string& session, Step history = 120,
-                std::function<void()> on_news = nullptr);
+                std::function<void()> on_news = nullptr, bool transforms = true);
   ~SessionClient();
 
   // Takes what has come, waiting for it as long as that if nothing has.

@@ -10,6 +10,7 @@
 #include "client/cli/export_command.h"
 #include "client/cli/run_command.h"
 #include "client/cli/scene_command.h"
+#include "client/cli/status_command.h"
 #include "client/cli/verify_command.h"
 #include "client/cli/view_command.h"
 #include "client/cli/watch_command.h"
@@ -40,7 +41,8 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   soda::cli::add_run_command(app, exit_code);
   soda::cli::add_watch_command(app, exit_code);
-  soda::cli::add_view_command(app, exit_code);
+  soda::cli::add_view_commands(app, exit_code);
+  soda::cli::add_status_commands(app, exit_code);
   soda::cli::add_act_command(app, exit_code);
   soda::cli::add_pace_commands(app, exit_code);
   soda::cli::add_diff_command(app, exit_code);

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <random>
 #include <string>
@@ -11,6 +12,7 @@
 #include "client/cli/exit_code.h"
 #include "client/viewer/gateway.h"
 #include "client/viewer/live_source.h"
+#include "client/viewer/replay_source.h"
 #include "common/dds/checks.h"
 #include "common/stop_signals.h"
 
@@ -22,6 +24,7 @@ struct ViewOptions {
   viewer::HttpOptions http;
   bool read_only = false;
   Step history = 180;
+  std::string recording;
   std::string page;  // folder; "": where the build has put it
   dds::NetworkOptions network;
 };
@@ -35,51 +38,77 @@ std::string random_token() {
 
 bool is_loopback(const std::string& address) { return address.rfind("127.", 0) == 0 || address == "::1"; }
 
-int view(ViewOptions options) {
-  dds::check_session_name(options.session);
+// Opens the gateway and says where.
+std::unique_ptr<viewer::Gateway> open(ViewOptions& options, const viewer::StaticFiles& files, const std::string& what) {
   if (options.read_only)
     options.http.token.clear();
   else if (options.http.token.empty())
     options.http.token = random_token();
-  StopSignals signals;
-  const viewer::StaticFiles files(options.page.empty() ? viewer::page_folder() : std::filesystem::path(options.page));
-  viewer::Gateway gateway(options.http, files);
-  viewer::LiveSource source(options.network, options.session, options.history, [&] { gateway.wake(); });
+  auto gateway = std::make_unique<viewer::Gateway>(options.http, files);
   const std::string host = is_loopback(options.http.address) ? "localhost" : options.http.address;
-  const std::string url = fmt::format("http://{}:{}/", host, gateway.port());
-  if (options.http.token.empty())
-    std::printf("session '%s' can be watched at  %s\n", options.session.c_str(), url.c_str());
-  else
-    std::printf("session '%s' can be watched and acted on at  %s?token=%s\n", options.session.c_str(), url.c_str(),
-                options.http.token.c_str());
+  const std::string token = options.http.token.empty() ? "" : "?token=" + options.http.token;
+  std::printf("%s can be watched%s at  http://%s:%u/%s\n", what.c_str(), token.empty() ? "" : " and acted on",
+              host.c_str(), static_cast<unsigned>(gateway->port()), token.c_str());
   std::fflush(stdout);
-  gateway.run(source, [&] { return signals.received() != 0; });
+  return gateway;
+}
+
+std::filesystem::path page_of(const ViewOptions& options) {
+  return options.page.empty() ? viewer::page_folder() : std::filesystem::path(options.page);
+}
+
+int view(ViewOptions options) {
+  dds::check_session_name(options.session);
+  StopSignals signals;
+  const viewer::StaticFiles files(page_of(options));
+  const auto gateway = open(options, files, "session '" + options.session + "'");
+  viewer::LiveSource source(options.network, options.session, options.history, [&] { gateway->wake(); });
+  gateway->run(source, [&] { return signals.received() != 0; });
   return kExitOk;
 }
 
-}  // namespace
+int replay(ViewOptions options) {
+  StopSignals signals;
+  const viewer::StaticFiles files(page_of(options));
+  viewer::ReplaySource source(options.recording);
+  const auto gateway = open(options, files, options.recording);
+  gateway->run(source, [&] { return signals.received() != 0; });
+  return kExitOk;
+}
 
-void add_view_command(CLI::App& app, int& exit_code) {
-  auto o = std::make_shared<ViewOptions>();
-  CLI::App* command = app.add_subcommand("view", "show a session in the browser, and let people act on it");
-  command->add_option("--session", o->session, "name of the session; it may begin later")->capture_default_str();
-  command->add_option("--port,-p", o->http.port, "to serve the page at; 0: any that is free")->capture_default_str();
-  command->add_option("--address", o->http.address, "to listen at; others than this machine's own only with care")
+void add_page_options(CLI::App& command, ViewOptions& o) {
+  command.add_option("--port,-p", o.http.port, "to serve the page at; 0: any that is free")->capture_default_str();
+  command.add_option("--address", o.http.address, "to listen at; others than this machine's own only with care")
       ->capture_default_str();
-  command->add_option("--token", o->http.token, "who has it in the link may act, others only watch; by default random")
+  command.add_option("--token", o.http.token, "who has it in the link may act, others only watch; by default random")
       ->check([](const std::string& token) {
         const bool good = token.size() >= 8 && token.find_first_not_of(
                                                    "0123456789abcdefghijklmnopqrstuvwxyz"
                                                    "ABCDEFGHIJKLMNOPQRSTUVWXYZ-_") == std::string::npos;
         return good ? "" : "at least 8 letters, digits, dashes and underscores";
       });
-  command->add_flag("--read-only", o->read_only, "nobody may act");
+  command.add_flag("--read-only", o.read_only, "nobody may act");
+  command.add_option("--page", o.page, "folder of the page, for developers of it");
+}
+
+}  // namespace
+
+void add_view_commands(CLI::App& app, int& exit_code) {
+  auto o = std::make_shared<ViewOptions>();
+  CLI::App* command = app.add_subcommand("view", "show a session in the browser, and let people act on it");
+  command->add_option("--session", o->session, "name of the session; it may begin later")->capture_default_str();
+  add_page_options(*command, *o);
   command->add_option("--history", o->history, "steps in the past that can be shown")
       ->capture_default_str()
       ->check(CLI::Range(Step{1}, Step{100'000}));
-  command->add_option("--page", o->page, "folder of the page, for developers of it");
   dds::add_network_options(*command, o->network);
   command->callback([o, &exit_code] { exit_code = guarded([&] { return view(*o); }); });
+
+  auto r = std::make_shared<ViewOptions>();
+  CLI::App* replay_command = app.add_subcommand("replay", "show a recording in the browser");
+  replay_command->add_option("recording", r->recording, "file of soda run --record")->required();
+  add_page_options(*replay_command, *r);
+  replay_command->callback([r, &exit_code] { exit_code = guarded([&] { return replay(*r); }); });
 }
 
 }  // namespace soda::cli

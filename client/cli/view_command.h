@@ -1,4 +1,4 @@
-// `soda view`: the viewer of a session, in the browser.
+// `soda view` and `soda replay`: a session, or a recording, in the browser.
 #pragma once
 
 namespace CLI {
@@ -7,6 +7,6 @@ class App;
 
 namespace soda::cli {
 
-void add_view_command(CLI::App& app, int& exit_code);
+void add_view_commands(CLI::App& app, int& exit_code);
 
 }  // namespace soda::cli

@@ -26,8 +26,8 @@ const char* state_name(std::uint8_t state) {
 }  // namespace
 
 LiveSource::LiveSource(const dds::NetworkOptions& network, const std::string& session, Step history,
-                       std::function<void()> on_news)
-    : session_(session), client_(network, session, history, std::move(on_news)) {}
+                       std::function<void()> on_news, bool transforms)
+    : session_(session), client_(network, session, history, std::move(on_news), transforms) {}
 
 News LiveSource::poll() {
   client_.poll(0ms);
@@ -129,16 +129,19 @@ view::Clocks LiveSource::clocks() const {
     clocks.set_oldest(buffer->oldest());
     clocks.set_newest(buffer->newest());
   }
-  clocks.set_final(std::max<Step>(0, buffer->final_step()));
   const auto now = Clock::now();
+  Step final_step = client_.session()->last_step();
   for (WorldId w = 0; w < client_.worlds().size(); ++w) {
-    view::WorldClock& clock = *clocks.add_world();
-    clock.set_clock(std::max<Step>(0, buffer->clock(w)));
-    clock.set_front(std::max<Step>(0, buffer->front(w)));
-    clock.set_final(std::max<Step>(0, buffer->final_step(w)));
     const auto& status = client_.worlds()[w].status;
+    view::WorldClock& clock = *clocks.add_world();
+    // Transforms are the newer news, where they are followed.
+    clock.set_clock(std::max<Step>(buffer->clock(w), status ? status->clock() : 0));
+    clock.set_front(buffer->front(w) >= 0 ? buffer->front(w) : status ? status->front() : 0);
+    clock.set_final(std::max<Step>(buffer->final_step(w), status ? status->final_step() : 0));
     clock.set_silent(client_.worlds()[w].silent(now) && !(status && status->state() == wire::STATE_DONE));
+    final_step = std::min<Step>(final_step, clock.final());
   }
+  clocks.set_final(final_step);
   return clocks;
 }
 

@@ -17,9 +17,9 @@ namespace soda::viewer {
 
 class LiveSource final : public Source {
  public:
-  // `on_news` as for SessionClient. `history`: steps in the past that can be shown.
+  // `on_news` and `transforms` as for SessionClient. `history`: steps in the past that can be shown.
   LiveSource(const dds::NetworkOptions& network, const std::string& session, Step history,
-             std::function<void()> on_news);
+             std::function<void()> on_news, bool transforms = true);
 
   News poll() override;
   bool ready() const override { return model_ != nullptr; }

@@ -65,6 +65,8 @@ bool DdsReports::finish(std::chrono::milliseconds at_most) {
   };
   bool all = digests_.wait_acknowledged(left());
   all = status_.wait_acknowledged(left()) && all;
+  // Viewers shall see the end, but nobody waits long for them.
+  (void)transforms_.wait_acknowledged(std::min(left(), std::chrono::milliseconds(300)));
   if (poses_) all = poses_->wait_acknowledged(left()) && all;
   if (states_) all = states_->wait_acknowledged(left()) && all;
   return all;
