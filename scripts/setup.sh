@@ -17,6 +17,12 @@ packages=(
   gnuplot-nox                                               # pictures
 )
 
+# The viewer's page is built with Node.js: one that is installed already, if it is new enough, else Debian's.
+node_major=$(node --version 2>/dev/null | sed 's/^v\([0-9]*\).*/\1/') || node_major=0
+if [ "${node_major:-0}" -lt 18 ] || ! command -v npm >/dev/null; then
+  packages+=(nodejs npm)
+fi
+
 missing=()
 for package in "${packages[@]}"; do
   [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")

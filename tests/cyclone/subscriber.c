@@ -20,7 +20,9 @@ enum { kMostWorlds = 64, kMostBodies = 4096, kAtOnce = 64 };
 
 /* What a world has told last: its bodies at its newest step. */
 struct world {
-  uint64_t next; /* number of the sample that comes next; 0: a whole one is needed */
+  uint64_t instance; /* of the session, as heard of last */
+  uint64_t next;     /* number of the sample that comes next; 0: a whole one is needed */
+  dds_time_t asked;  /* when that was asked for */
   int64_t step, final_step;
   size_t bodies;
   uint64_t id[kMostBodies];
@@ -50,6 +52,7 @@ static void drop(struct world *w, uint64_t id) {
 static bool take(const soda_wire_Transforms *s, uint32_t count) {
   if (s->world >= count) return false;
   struct world *w = &worlds[s->world];
+  w->instance = s->instance;
   if (s->kind == soda_wire_VIEW_WHOLE)
     w->bodies = 0;
   else if (w->next == 0 || s->number != w->next) {
@@ -63,6 +66,17 @@ static bool take(const soda_wire_Transforms *s, uint32_t count) {
   for (uint32_t i = 0; i < s->gone._length; ++i) drop(w, s->gone._buffer[i]);
   w->step = s->step;
   return true;
+}
+
+/* Asks each world of which something is missing for all of it, twice a second. */
+static void ask(dds_entity_t writer, uint32_t count) {
+  const dds_time_t now = dds_time();
+  for (uint32_t w = 0; w < count; ++w) {
+    if (worlds[w].next > 0 || worlds[w].instance == 0 || now - worlds[w].asked < DDS_MSECS(500)) continue;
+    worlds[w].asked = now;
+    soda_wire_Lack lack = {.instance = worlds[w].instance, .world = w};
+    (void)dds_write(writer, &lack);
+  }
 }
 
 int main(int argc, char **argv) {
@@ -88,9 +102,12 @@ int main(int argc, char **argv) {
   const dds_entity_t topic =
       dds_create_topic(participant, &soda_wire_Transforms_desc, "soda/transforms", NULL, NULL);
   const dds_entity_t reader = dds_create_reader(subscriber, topic, qos, NULL);
+  const dds_entity_t lack_topic = dds_create_topic(participant, &soda_wire_Lack_desc, "soda/lack", NULL, NULL);
+  const dds_entity_t publisher = dds_create_publisher(participant, qos, NULL);
+  const dds_entity_t writer = dds_create_writer(publisher, lack_topic, qos, NULL);
   dds_delete_qos(qos);
-  if (reader < 0) {
-    fprintf(stderr, "error: %s\n", dds_strretcode(-reader));
+  if (reader < 0 || writer < 0) {
+    fprintf(stderr, "error: %s\n", dds_strretcode(reader < 0 ? -reader : -writer));
     return 1;
   }
 
@@ -99,6 +116,7 @@ int main(int argc, char **argv) {
   const dds_time_t end = dds_time() + (dds_time_t)(patience * 1e9);
   while (!ended && dds_time() < end) {
     const dds_return_t n = dds_take(reader, samples, infos, kAtOnce, kAtOnce);
+    ask(writer, count);
     if (n <= 0) {
       dds_sleepfor(DDS_MSECS(5));
       continue;

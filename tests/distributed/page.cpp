@@ -28,11 +28,10 @@ Page::Page(std::uint16_t port, const std::string& target, const std::string& ori
   if (!origin.empty())
     impl_->stream.set_option(websocket::stream_base::decorator(
         [origin](websocket::request_type& request) { request.set(http::field::origin, origin); }));
-  websocket::response_type response;
   beast::error_code error;
-  impl_->stream.handshake(response, "127.0.0.1:" + std::to_string(port), target, error);
+  impl_->stream.handshake("127.0.0.1:" + std::to_string(port), target, error);
   if (error) {
-    refusal_ = std::to_string(response.result_int()) + " " + response.body();
+    refusal_ = error.message();
     closed = true;
     return;
   }
@@ -97,6 +96,7 @@ void Page::take(const view::ToPage& message) {
     case view::ToPage::kBodies:
       ids.resize(message.bodies().first());
       ids.insert(ids.end(), message.bodies().id().begin(), message.bodies().id().end());
+      for (int i = 0; i < message.bodies().id_size(); ++i) mass[message.bodies().id(i)] = message.bodies().mass(i);
       break;
     case view::ToPage::kFrame:
       take(message.frame());

@@ -34,7 +34,8 @@ class Page {
   std::string close_reason;
   view::Welcome welcome;
   bool welcomed = false;
-  std::vector<std::uint64_t> ids;  // by index
+  std::vector<std::uint64_t> ids;        // by index
+  std::map<std::uint64_t, double> mass;  // kg, by id
   struct Body {
     std::array<float, 3> position{};
     int world = 0, flags = 0;
