@@ -234,7 +234,7 @@ const bar = new Bar(byId('bar'), session, settings, {
 });
 const banner = new Banner(byId('banner'), session, { reconnect: () => connection.open(), link: () => connection.state });
 
-const legend = () => drawLegend(byId('legend'), settings.now, session.welcome?.worlds ?? 0);
+const legend = () => drawLegend(byId('legend'), settings.now, session.welcome?.worlds ?? 0, picture.colours.topSpeed);
 
 function showSettingsOnPage(): void {
   document.body.classList.toggle('no-panel', !settings.now.panel);
@@ -309,6 +309,7 @@ function frame(): void {
     since = end;
     bar.showRate(rates.fps, picture.instances.drawn);
     quality.measured(rates.fps);
+    if (picture.measureSpeeds()) legend();
   }
   requestAnimationFrame(frame);
 }

@@ -20,7 +20,7 @@ export interface Settings {
   labels: boolean;
   panel: boolean;
   ticker: boolean;
-  speedScale: number; // m/s at the top of the ramp
+  speedScale: number; // m/s at the top of the ramp; 0: by the bodies
   pushSpeed: number; // m/s that a push changes a body's velocity by
   spawnShape: SpawnShape;
   spawnSize: number; // m
@@ -39,7 +39,7 @@ export const defaults: Settings = {
   labels: true,
   panel: true,
   ticker: true,
-  speedScale: 8,
+  speedScale: 0,
   pushSpeed: 5,
   spawnShape: 'box',
   spawnSize: 0.5,
@@ -97,6 +97,6 @@ export class SettingsStore {
 
 function fits(key: keyof Settings, value: unknown): boolean {
   if (typeof value !== typeof defaults[key]) return false;
-  if (typeof value === 'number') return Number.isFinite(value) && value > 0;
+  if (typeof value === 'number') return Number.isFinite(value) && (value > 0 || (value === 0 && key === 'speedScale'));
   return words[key]?.includes(value as string) ?? true;
 }

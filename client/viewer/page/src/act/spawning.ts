@@ -14,7 +14,7 @@ export const halfHeight = (shape: SpawnShape, size: number) => (shape === 'capsu
 let counter = 0n;
 
 // `size`: edge of the box, diameter of the sphere, of the capsule half its length.
-export function spawnOf(shape: SpawnShape, size: number, at: Vector3, velocity: Vector3): Spawn {
+export function spawnOf(shape: SpawnShape, size: number, at: Vector3): Spawn {
   const kind = {
     box: { case: 'box', value: { size: { x: size, y: size, z: size } } },
     sphere: { case: 'sphere', value: { radius: 0.5 * size } },
@@ -24,7 +24,6 @@ export function spawnOf(shape: SpawnShape, size: number, at: Vector3, velocity: 
     body: create(BodySchema, {
       name: 'from the viewer',
       pose: create(PoseSchema, { position: vec3(at) }),
-      linearVelocity: vec3(velocity),
       shape: [create(ShapeSchema, { kind: kind[shape] as never })],
       colour: ((hashColour(0x517n + counter++) << 8) | 0xff) >>> 0,
     }),

@@ -28,6 +28,7 @@ export class Tools {
   private grabbing: Grabbing | null = null;
   private down: { x: number; y: number; button: number; used: boolean } | null = null;
   private caster = new Raycaster();
+  private awaited: bigint | null = null; // a spawned body, to be selected once it is there
   private hoverAt: PointerEvent | null = null;
 
   constructor(
@@ -102,12 +103,19 @@ export class Tools {
       if (ground && ground.distance < distance + spawnSize)
         at.copy(ground.point).addScaledVector(ground.normal, halfHeight(spawnShape, spawnSize) + 0.02);
     }
-    void this.requests.act({ case: 'spawn', value: spawnOf(spawnShape, spawnSize, at, new Vector3()) });
+    void this.requests.act({ case: 'spawn', value: spawnOf(spawnShape, spawnSize, at) }).then((answer) => {
+      if (answer.accepted) this.awaited = answer.body;
+    });
   }
 
   // Once per picture.
   update(): void {
     if (this.grabbing?.over) this.letGo();
+    const spawned = this.awaited === null ? undefined : this.bodies.indexOf(this.awaited);
+    if (spawned !== undefined && this.bodies.present[spawned]) {
+      this.awaited = null;
+      this.select(spawned);
+    }
     this.marks.setSpring(
       this.grabbing && { body: this.grabbing.body, point: this.grabbing.point, target: this.grabbing.target },
     );

@@ -13,7 +13,7 @@ function mix(a: number, b: number, share: number): number {
   return part(16) | part(8) | part(0);
 }
 
-const muted = 0x7c828c; // of bodies that are not meant, while others are pointed out
+const muted = 0x969ca6; // of bodies that are not meant, while others are pointed out
 const shining = 0xb0 << 24;
 
 export class BodyColours {
@@ -21,10 +21,34 @@ export class BodyColours {
   private ownFor: boolean | null = null;
   private ownIds: bigint[] | null = null; // of which scene
 
+  // Speed at the top of the ramp, m/s: as the user has set it, or by the bodies.
+  private measured = 5;
+
   constructor(
     private readonly bodies: Bodies,
     private readonly settings: Settings,
   ) {}
+
+  get topSpeed(): number {
+    return this.settings.speedScale || this.measured;
+  }
+
+  // Looks at the speeds of now; whether the top of the ramp has changed. Where nothing moves it stays.
+  measure(): boolean {
+    const { present, speed, count } = this.bodies;
+    const speeds: number[] = [];
+    for (let i = 0; i < count; i++) if (present[i] && speed[i]! > 0.05) speeds.push(speed[i]!);
+    if (speeds.length === 0) return false;
+    speeds.sort((a, b) => a - b);
+    const fast = speeds[Math.floor(0.95 * (speeds.length - 1))]!;
+    // Up when it is passed, down when a much smaller one would do: the colours should not flicker.
+    if (fast <= this.measured && fast > 0.35 * this.measured) return false;
+    const power = 10 ** Math.floor(Math.log10(fast));
+    const wanted = power * [1, 2, 5, 10].find((f) => f * power >= fast)!;
+    const changed = wanted !== this.measured;
+    this.measured = wanted;
+    return changed;
+  }
 
   // 0xAARRGGBB: alpha is how much the body shines.
   of(body: number): number {
@@ -46,7 +70,7 @@ export class BodyColours {
       case 'speed':
         return flags & FrameFlag.FLAG_ASLEEP
           ? speedTable[0]!
-          : speedTable[speedIndex(this.bodies.speed[body]!, this.settings.speedScale)]!;
+          : speedTable[speedIndex(this.bodies.speed[body]!, this.topSpeed)]!;
       case 'sleep':
         return flags & FrameFlag.FLAG_ASLEEP ? asleepColour : awakeColour;
       case 'body':

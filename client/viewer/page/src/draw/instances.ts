@@ -128,7 +128,8 @@ export class Instances {
   private groups: Group[] = [];
   private groupOf = new Uint32Array(0); // of each body
   private slotOf = new Uint32Array(0);
-  private depth = bodyDepthMaterial();
+  private depth = bodyDepthMaterial(); // for shadows; three.js turns its sides round
+  private plain = bodyDepthMaterial(); // for Occlusion
   private fine = true;
   drawn = 0;
 
@@ -223,7 +224,7 @@ export class Instances {
 
   // For Occlusion: drawn with a material that writes depth only.
   depthOnly(on: boolean): void {
-    for (const group of this.groups) group?.depthOnly(on, this.depth);
+    for (const group of this.groups) group?.depthOnly(on, this.plain);
   }
 
   private place(body: number): void {

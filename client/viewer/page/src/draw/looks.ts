@@ -21,7 +21,7 @@ export const looks: Record<'dark' | 'light', Look> = {
     nadir: 0x0b0f15,
     sky: 0x9db8dc,
     ground: 0x5a5048,
-    ambient: 1.4,
+    ambient: 1.6,
     sun: 0xffead0,
     sunlight: 2.4,
     lines: 0x9fb4d0,

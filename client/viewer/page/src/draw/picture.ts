@@ -28,6 +28,7 @@ export class Picture {
   readonly marks: Marks;
   readonly picker: Picker;
   readonly instances: Instances;
+  readonly colours: BodyColours;
   playback: Playback | null = null;
   private statics: Statics;
   private territory: Territory;
@@ -51,8 +52,8 @@ export class Picture {
     this.labels = new Labels(labels);
     this.marks = new Marks(scene, camera, this.bodies, this.shapes);
     this.picker = new Picker(this.bodies, this.shapes, this.statics);
-    const colours = new BodyColours(this.bodies, settings.now);
-    this.instances = new Instances(scene, this.bodies, this.shapes, (body) => colours.of(body));
+    this.colours = new BodyColours(this.bodies, settings.now);
+    this.instances = new Instances(scene, this.bodies, this.shapes, (body) => this.colours.of(body));
     this.occlusion = new Occlusion(this.stage, this.instances, this.statics);
     settings.onChange((_, key) => {
       if (['colour', 'near', 'mixed', 'speedScale'].includes(key)) this.instances.recolourAll();
@@ -135,6 +136,13 @@ export class Picture {
       this.canvas.clientHeight,
       this.settings.now.borders && this.settings.now.labels,
     );
+  }
+
+  // About once a second; whether the legend has to be written anew.
+  measureSpeeds(): boolean {
+    if (this.settings.now.colour !== 'speed' || !this.colours.measure()) return false;
+    this.instances.recolourAll();
+    return true;
   }
 
   // Where a body is on the page, in pixels; null: not in the scene, or behind the camera.

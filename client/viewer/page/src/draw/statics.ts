@@ -186,7 +186,7 @@ float linesOf(vec2 place, float apart, float width) {
   vec2 off = abs(fract(p - 0.5) - 0.5);
   vec2 half_width = max(vec2(0.5 * width / apart), 0.5 * pixel);
   vec2 line = 1.0 - smoothstep(half_width, half_width + pixel, off);
-  line *= 1.0 - smoothstep(0.08, 0.3, pixel);
+  line *= 1.0 - smoothstep(0.05, 0.22, pixel);
   return max(line.x, line.y);
 }
 `;

@@ -1,19 +1,21 @@
 // Which step the user wants to see, and telling the gateway of it, not more often than it could send frames.
 import { create } from '@bufbuild/protobuf';
-import { LookSchema, type FromPage } from '../gen/viewer_pb';
+import { LookSchema, type FromPage, type Look } from '../gen/viewer_pb';
+import { throttled } from '../throttle';
 
 const perSecond = 30;
 
 export class Looking {
   offset = 0; // steps from the displayed one
   held: number | null = null; // always this step, rather than the offset
-  private timer = 0;
-  private sentAt = 0;
+  private readonly send: (which: Look['which']) => void;
 
   constructor(
-    private readonly send: (what: FromPage['what']) => void,
+    send: (what: FromPage['what']) => void,
     private readonly changed: () => void,
-  ) {}
+  ) {
+    this.send = throttled((which) => send({ case: 'look', value: create(LookSchema, { which }) }), 1000 / perSecond);
+  }
 
   get live(): boolean {
     return this.held === null && this.offset === 0;
@@ -40,29 +42,10 @@ export class Looking {
     if (!this.live) this.tell();
   }
 
-  reset(): void {
-    this.offset = 0;
-    this.held = null;
-    this.changed();
-  }
-
   private tell(): void {
     this.changed();
-    clearTimeout(this.timer);
-    const wait = this.sentAt + 1000 / perSecond - performance.now();
-    if (wait > 0) {
-      this.timer = window.setTimeout(() => this.tell(), wait);
-      return;
-    }
-    this.sentAt = performance.now();
-    this.send({
-      case: 'look',
-      value: create(LookSchema, {
-        which:
-          this.held !== null
-            ? { case: 'step', value: BigInt(this.held) }
-            : { case: 'offset', value: BigInt(this.offset) },
-      }),
-    });
+    this.send(
+      this.held !== null ? { case: 'step', value: BigInt(this.held) } : { case: 'offset', value: BigInt(this.offset) },
+    );
   }
 }

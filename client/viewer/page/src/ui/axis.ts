@@ -47,7 +47,7 @@ export class Axis {
     for (const [low, high] of parts) {
       const pixels = Math.abs(this.x(high) - this.x(low));
       const apart = roundUp(((high - low) * 80) / Math.max(1, pixels));
-      for (let s = Math.ceil(low / apart) * apart; s <= high; s += apart) if (s >= 0) found.push(s);
+      for (let s = Math.max(0, Math.ceil(low / apart) * apart); s <= high; s += apart) found.push(s);
     }
     return found;
   }

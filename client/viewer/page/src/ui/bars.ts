@@ -8,7 +8,7 @@ import { sharpContext } from './dom';
 const top = 16; // pixels for the numbers
 const gutter = 2;
 
-export const rowHeight = (worlds: number) => (worlds <= 4 ? 12 : worlds <= 8 ? 9 : worlds <= 16 ? 6 : worlds <= 32 ? 4 : 3);
+export const rowHeight = (worlds: number) => (worlds <= 8 ? 12 : worlds <= 16 ? 7 : worlds <= 32 ? 5 : 3);
 export const barsHeight = (worlds: number) => top + Math.max(1, worlds) * rowHeight(worlds) + 3;
 
 export interface BarColours {
@@ -63,6 +63,7 @@ export function drawBars(
   context.fillStyle = colours.text;
   context.strokeStyle = colours.line;
   context.lineWidth = 1;
+  let written = -Infinity; // up to where
   for (const step of axis.ticks()) {
     const x = Math.round(axis.x(step)) + 0.5;
     context.beginPath();
@@ -71,7 +72,9 @@ export function drawBars(
     context.stroke();
     const label = step.toLocaleString('en');
     const half = context.measureText(label).width / 2;
-    if (x - half > 0 && x + half < width) context.fillText(label, x - half, 7);
+    if (x - half < Math.max(0, written + 8) || x + half > width) continue;
+    context.fillText(label, x - half, 7);
+    written = x + half;
   }
 
   const box = (from: number, to: number, y: number, fill: string | CanvasPattern) => {

@@ -115,7 +115,7 @@ export function settingsDialog(settings: SettingsStore, host: SettingsHost): () 
     box('grid', 'Lines on floors'),
     box('labels', 'Names of territories'),
     box('ticker', 'Tell what happens, at the lower left'),
-    number('speedScale', 'Colour by speed: m/s at the bright end', 0.1, 200, 0.1),
+    number('speedScale', 'Colour by speed: m/s at the bright end (0: by the bodies)', 0, 200, 0.1),
     number('pushSpeed', 'Push: change of speed, m/s', 0.1, 100, 0.1),
     h('h3', {}, 'Link to this view'),
     tokenRow,

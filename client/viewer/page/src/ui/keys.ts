@@ -3,6 +3,12 @@
 export type KeyMap = Record<string, (event: KeyboardEvent) => void>;
 
 export function listenToKeys(map: KeyMap): void {
+  // What was clicked on with the pointer does not keep the keyboard: space then pauses, rather than click again.
+  const letGo = (event: MouseEvent) => {
+    const control = (event.target as Element).closest<HTMLElement>('button, summary, input[type=range], input[type=checkbox]');
+    if (control && !control.closest('dialog') && event.detail > 0) control.blur();
+  };
+  window.addEventListener('click', letGo);
   window.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (document.querySelector('dialog[open]')) return;

@@ -6,14 +6,14 @@ import { digits } from './words';
 
 const mostWorlds = 12;
 
-export function drawLegend(root: HTMLElement, settings: Settings, worlds: number): void {
+export function drawLegend(root: HTMLElement, settings: Settings, worlds: number, topSpeed: number): void {
   const entry = (colour: number, text: string) =>
     h('span', { class: 'entry' }, h('span', { class: 'dot', style: `background:${css(colour)}` }), text);
   const entries: HTMLElement[] = [];
   if (settings.colour === 'speed') {
     // The ramp is drawn over roots of speeds (colours.ts), so its numbers are squares.
     const stops = Array.from({ length: 9 }, (_, k) => css(speedRamp(k / 8))).join(',');
-    const mark = (share: number) => h('span', { style: `left:${100 * share}%` }, digits(settings.speedScale * share * share, 2));
+    const mark = (share: number) => h('span', { style: `left:${100 * share}%` }, digits(topSpeed * share * share, 2));
     entries.push(
       h(
         'div',

@@ -6,6 +6,7 @@ import { Axis } from './axis';
 import { barsHeight, drawBars, rowHeight } from './bars';
 import { h, icon, iconButton, setIcon, setText } from './dom';
 import { css, worldColour } from '../draw/colours';
+import { throttled } from '../throttle';
 import { clockTime, count, digits, signed } from './words';
 
 export interface TimelineHost {
@@ -39,7 +40,6 @@ export class Timeline {
   private dragging = false;
   private sliding = 0; // ms, until when the slider is the user's
   private paused = false;
-  private seekTimer = 0;
   private slowSince = 0;
 
   constructor(
@@ -54,10 +54,11 @@ export class Timeline {
     this.slider = h('input', { type: 'range', min: -1, max: Math.log10(fastest), step: 0.01, value: 0, 'aria-label': 'Speed' });
     this.speedText = h('output', { class: 'speed' }, '1 ×');
     this.max = h('button', { type: 'button', class: 'text-button', title: 'As fast as possible', 'aria-pressed': 'false' }, 'max');
+    const speed = throttled((multiple: number) => host.speed(multiple), 100);
     this.slider.addEventListener('input', () => {
       const value = 10 ** Number(this.slider.value);
       this.sliding = performance.now() + 700;
-      host.speed(Math.abs(value - 1) < 0.06 ? 1 : Number(value.toFixed(2)));
+      speed(Math.abs(value - 1) < 0.06 ? 1 : Number(value.toFixed(2)));
     });
     this.max.addEventListener('click', () => host.speed(this.max.getAttribute('aria-pressed') === 'true' ? 1 : 0));
     this.state = h('div', { class: 'state', role: 'status', 'aria-live': 'polite' });
@@ -270,8 +271,5 @@ export class Timeline {
     return Math.round(Math.min(this.session.newest, Math.max(this.session.oldest, step)));
   }
 
-  private seek(step: number): void {
-    clearTimeout(this.seekTimer);
-    this.seekTimer = window.setTimeout(() => this.host.seek(this.clamp(step)), 40);
-  }
+  private readonly seek = throttled((step: number) => this.host.seek(this.clamp(step)), 60);
 }

@@ -6,7 +6,8 @@ import { h, setText } from './dom';
 import { drawSpark } from './spark';
 import { bytes, count, digits, percent } from './words';
 
-const openAtFirst = 4; // of more worlds, only these cards are open
+// Cards that are open at first; of more worlds, or in a small window, the others are closed.
+const openAtFirst = () => (window.innerWidth < 720 ? 0 : 4);
 
 interface Card {
   root: HTMLDetailsElement;
@@ -138,7 +139,7 @@ export class WorldsPanel {
       grid,
       h('div', { class: 'plots' }, loadBox, leadBox, rollbacksBox),
     );
-    root.open = w < openAtFirst;
+    root.open = w < openAtFirst();
     root.addEventListener('toggle', () => this.updateCard(w, performance.now() / 1000));
     this.list.append(root);
     this.cards.push({ root, badge, brief, values, plots: { load, lead, rollbacks } });
