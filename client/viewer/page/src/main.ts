@@ -47,6 +47,7 @@ const session: Session = new Session({
     if (link.camera) picture.views.restore(link.camera);
     link.camera = null;
     worldsPanel.clear();
+    worldsPanel.update(seconds());
     tools.select(-1);
     bar.show();
     toolbar.update();
@@ -76,6 +77,7 @@ const session: Session = new Session({
     connection.finish();
     toolbar.update();
     banner.update();
+    timeline.update();
   },
   said(text) {
     ticker.said(text);

@@ -86,23 +86,21 @@ export class Tools {
     void this.requests.act({ case: 'remove', value: create(RemoveSchema, { body: this.bodies.ids[body]! }) });
   }
 
-  // In front of the camera, or on what is under the pointer.
-  spawn(hit: Hit | null = null): void {
+  // On what is under the pointer, or is looked at; where that is nothing, in the air before the camera.
+  spawn(pointed: Hit | null = null): void {
     if (!this.host.mayAct()) {
       this.host.say(this.host.whyNot(), 'bad');
       return;
     }
     const { spawnShape, spawnSize } = this.settings.now;
     const at = new Vector3();
-    if (hit) at.copy(hit.point).addScaledVector(hit.normal, halfHeight(spawnShape, spawnSize) + 0.02);
-    else {
-      const camera = this.stage.camera;
-      const distance = Math.min(camera.position.distanceTo(this.views.controls.target), 0.5 * this.views.extent() + 4);
-      at.copy(camera.position).addScaledVector(camera.getWorldDirection(new Vector3()), distance);
-      const ground = this.picker.pick(new Ray(camera.position.clone(), camera.getWorldDirection(new Vector3())));
-      if (ground && ground.distance < distance + spawnSize)
-        at.copy(ground.point).addScaledVector(ground.normal, halfHeight(spawnShape, spawnSize) + 0.02);
-    }
+    const camera = this.stage.camera;
+    const ahead = new Ray(camera.position.clone(), camera.getWorldDirection(new Vector3()));
+    const distance = camera.position.distanceTo(this.views.controls.target);
+    const hit = pointed ?? this.picker.pick(ahead);
+    if (hit && (pointed || hit.distance < 2 * distance))
+      at.copy(hit.point).addScaledVector(hit.normal, halfHeight(spawnShape, spawnSize) + 0.02);
+    else ahead.at(distance, at);
     void this.requests.act({ case: 'spawn', value: spawnOf(spawnShape, spawnSize, at) }).then((answer) => {
       if (answer.accepted) this.awaited = answer.body;
     });

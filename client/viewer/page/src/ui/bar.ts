@@ -58,7 +58,7 @@ export class Bar {
     const welcome = this.session.welcome;
     if (!welcome) return;
     setText(this.name, welcome.session);
-    setText(this.scene, [welcome.scene, welcome.replay ? 'recording' : ''].filter(Boolean).join(' · '));
+    setText(this.scene, welcome.scene);
     document.title = `${welcome.session} · SODA`;
     this.rights.hidden = welcome.mayAct && !welcome.replay;
     setText(this.rights, welcome.replay ? 'recording' : 'read-only');

@@ -86,10 +86,17 @@ export function drawBars(
   };
   for (let w = 0; w < worlds; w++) {
     const y = top + w * row;
-    const { clock, front, final } = session.rows[w] ?? { clock: 0, front: 0, final: 0 };
     const rgb = worldColour(w);
     context.fillStyle = colours.track;
     context.fillRect(0, y, width, row - gutter);
+    const clocks = session.rows[w];
+    if (!clocks) {
+      // A recording has no worlds: what is behind and what is to come.
+      box(session.oldest, session.displayed, y, css(rgb, 0.95));
+      box(session.displayed, session.newest, y, css(rgb, 0.3));
+      continue;
+    }
+    const { clock, front, final } = clocks;
     const ahead = Math.max(front, final);
     box(session.oldest, final, y, css(rgb, 0.95));
     box(final, ahead, y, css(rgb, 0.42));

@@ -7,6 +7,8 @@ import { h } from './dom';
 import { count, digits, plural } from './words';
 
 const lines = 6;
+// Not `move`, of which there are thirty a second, nor what the timeline shows.
+const told = new Set(['push', 'grab', 'release', 'spawn', 'remove']);
 const stays = 20; // s
 const gather = 0.4; // s in which repairs of one world are one line
 const causedWithin = 3; // s after an answer in which a repair from its step on is the user's
@@ -28,8 +30,7 @@ export class Ticker {
       this.line(`refused: ${answer.asked}: ${answer.reason}`, 'bad');
       return;
     }
-    if (answer.asked === 'move') return; // thirty a second
-    if (answer.step > 0) {
+    if (answer.step > 0 && told.has(answer.asked)) {
       this.mine.push({ step: answer.step, asked: answer.asked, at: now });
       if (this.mine.length > 30) this.mine.shift();
       const what = answer.asked === 'spawn' && answer.body > 0n ? `spawn of body ${answer.body}` : answer.asked;

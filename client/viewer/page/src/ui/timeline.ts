@@ -191,8 +191,11 @@ export class Timeline {
     const difference = this.difference();
     const live = looking.live || replay;
     let kind = 'live';
-    let text = replay ? 'recording' : 'live';
-    if (clocks.gathering) {
+    let text = !replay ? 'live' : session.displayed >= session.newest ? 'end of the recording' : 'recording';
+    if (session.ended) {
+      kind = 'wait';
+      text = 'ended';
+    } else if (clocks.gathering) {
       kind = 'wait';
       text = 'waiting for worlds';
     } else if (!live && difference > 0) {
@@ -219,7 +222,12 @@ export class Timeline {
     const step = session.displayed + difference;
     const dt = session.welcome?.dt ?? 0;
     const speed = clocks.paused ? '' : ` · ${digits(clocks.speed, 2)} × real time`;
-    setText(this.stepText, `step ${count(step)} · ${clockTime(step * dt)} s · final ${count(session.final)}${replay ? '' : speed}`);
+    setText(
+      this.stepText,
+      replay
+        ? `step ${count(step)} of ${count(session.newest)} · ${clockTime(step * dt)} s`
+        : `step ${count(step)} · ${clockTime(step * dt)} s · final ${count(session.final)}${speed}`,
+    );
     this.liveButton.disabled = live;
     this.liveButton.hidden = this.holdButton.hidden = replay;
     this.holdButton.setAttribute('aria-pressed', String(looking.held !== null));

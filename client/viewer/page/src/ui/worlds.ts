@@ -54,6 +54,7 @@ export class WorldsPanel {
     const { worlds, rows } = this.session;
     const number = Math.max(worlds.length, rows.length);
     while (this.cards.length < number) this.addCard();
+    this.head.hidden = number === 0; // of a recording
     const bodies = worlds.reduce((sum, w) => sum + Number(w.bodies), 0);
     setText(this.head, `${number === 1 ? '1 world' : `${number} worlds`} · ${count(bodies)} bodies`);
     for (let w = 0; w < number; w++) this.updateCard(w, now);
