@@ -1,5 +1,5 @@
 // The page: brings together what is told (net, model), what is drawn (draw), what is done (act) and what is read (ui).
-import './style.css';
+import './style/index.css';
 import { Tools } from './act/tools';
 import { expose, type Rates } from './debug';
 import { Picture } from './draw/picture';

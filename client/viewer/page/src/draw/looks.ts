@@ -1,4 +1,4 @@
-// The two themes as the 3D view has them. The page's own colours are in style.css.
+// The two themes as the 3D view has them. The page's own colours are in style/base.css.
 export interface Look {
   zenith: number;
   horizon: number; // and fog
