@@ -88,10 +88,7 @@ void Gateway::look() {
       continue;
     }
     if (!page->is_open()) continue;
-    if (!page->welcomed() && source_->ready()) {
-      page->welcome(*source_);
-      if (ended_told_) ended_told_ = false;
-    }
+    if (!page->welcomed() && source_->ready()) page->welcome(*source_);
     page->tell_bodies(*source_);
     page->show(*source_);
   }
@@ -109,14 +106,8 @@ void Gateway::look() {
     for (const auto& [key, page] : pages)
       if (page->welcomed()) page->tell_newest(message);
   }
-  const std::string ended = source_->ended();
-  if (!ended.empty() && !ended_told_) {
-    ended_told_ = true;
-    view::ToPage message;
-    message.mutable_ended()->set_reason(ended);
-    for (const auto& [key, page] : pages)
-      if (page->is_open()) page->tell(message);
-  }
+  if (const std::string ended = source_->ended(); !ended.empty())
+    for (const auto& [key, page] : pages) page->tell_ended(ended);
 }
 
 void Gateway::wants(PageLink& page, const view::Do& wanted) {

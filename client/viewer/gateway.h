@@ -48,7 +48,6 @@ class Gateway {
   std::map<std::uint64_t, Asked> asked_;  // by the source's tag
   std::atomic<bool> woken_{false};
   Clock::time_point clocks_at_{}, worlds_at_{};
-  bool ended_told_ = false;
   std::unique_ptr<HttpServer> server_;  // last: its handlers use the rest
 };
 

@@ -134,6 +134,13 @@ void PageLink::show(const Source& source) {
   tell(std::move(message));
 }
 
+void PageLink::tell_ended(const std::string& reason) {
+  if (!open_ || std::exchange(ended_, true)) return;
+  view::ToPage message;
+  message.mutable_ended()->set_reason(reason);
+  tell(std::move(message));
+}
+
 void PageLink::tell(view::ToPage message) {
   if (!open_ || closing_) return;
   queue_.push_back(message.SerializeAsString());

@@ -37,10 +37,11 @@ class PageLink : public std::enable_shared_from_this<PageLink> {
   bool welcomed() const { return welcomed_; }
   // Tells the scene. Before that, nothing else should be told.
   void welcome(const Source& source);
-  void tell_bodies(const Source& source);  // those that it has not been told
-  void show(const Source& source);         // a frame, if there is something new and the page is ready for it
-  void tell(view::ToPage message);         // surely, in order
-  void tell_newest(view::ToPage message);  // in place of one of its kind that waits
+  void tell_bodies(const Source& source);      // those that it has not been told
+  void show(const Source& source);             // a frame, if there is something new and the page is ready for it
+  void tell_ended(const std::string& reason);  // once
+  void tell(view::ToPage message);             // surely, in order
+  void tell_newest(view::ToPage message);      // in place of one of its kind that waits
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -54,7 +55,7 @@ class PageLink : public std::enable_shared_from_this<PageLink> {
   const bool may_act_;
   Handlers handlers_;
   boost::beast::flat_buffer incoming_;
-  bool open_ = false, welcomed_ = false, writing_ = false, closing_ = false;
+  bool open_ = false, welcomed_ = false, writing_ = false, closing_ = false, ended_ = false;
   std::string outgoing_;  // being written
   std::deque<std::string> queue_;
   std::size_t queued_bytes_ = 0;

@@ -31,7 +31,7 @@ TEST_F(Command, BadInputIsExitCodeTwoWithAReason) {
   expect_bad({"run", good, "--interface", "lo"}, "--interface");
   expect_bad({"run"}, "scene");
   expect_bad({"run", good, "--no-such-option"}, "--no-such-option");
-  expect_bad({}, "subcommand is required: run, watch, act, ");
+  expect_bad({}, "subcommand is required: run, watch, ");
   expect_bad({"act", "jump", "3"}, "push, velocity, pose, grab, move, release, spawn, remove; not 'jump'");
 }
 
