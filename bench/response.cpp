@@ -1,5 +1,5 @@
 // `soda-bench response`: how long it takes from a user's push until it shows. A session in real time over DDS, one push
-// after another at random moments: until it is answered, until its step is displayed, and until a transform of a final
+// after another at random moments: until it is answered, until its step is displayed, and until the new state of that step has been told
 // step says that the body has the push's velocity.
 #include <sys/wait.h>
 #include <unistd.h>
@@ -176,8 +176,8 @@ void measure(const Options& options, int lead, Csv& csv, Headline& headline) {
   const std::string key = "lead_" + std::to_string(lead) + ".";
   headline.add(key + "answered_ms_median", quantile(answered, 0.5));
   headline.add(key + "answered_ms_p99", quantile(answered, 0.99));
-  headline.add(key + "final_ms_median", quantile(seen, 0.5));
-  headline.add(key + "final_ms_p99", quantile(seen, 0.99));
+  headline.add(key + "told_ms_median", quantile(seen, 0.5));
+  headline.add(key + "told_ms_p99", quantile(seen, 0.99));
   headline.add(key + "displayed_ms_median", quantile(displayed, 0.5));
   headline.add(key + "displayed_ms_p99", quantile(displayed, 0.99));
 }
@@ -185,7 +185,7 @@ void measure(const Options& options, int lead, Csv& csv, Headline& headline) {
 }  // namespace
 
 void response(const Options& options, Headline& headline) {
-  Csv csv(options, "response", "lead,answered_ms,displayed_ms,final_ms");
+  Csv csv(options, "response", "lead,answered_ms,displayed_ms,told_ms");
   for (const int lead : {2, 4}) measure(options, lead, csv, headline);
   csv.close();
   plot(options, "response",
