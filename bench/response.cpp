@@ -1,6 +1,6 @@
 // `soda-bench response`: how long it takes from a user's push until it shows. A session in real time over DDS, one push
-// after another at random moments: until it is answered, until its step is displayed, and until the new state of that step has been told
-// step says that the body has the push's velocity.
+// after another at random moments: until it is answered, until its step is displayed, and until the world has told
+// viewers a state of that step in which the body has the push's velocity.
 #include <sys/wait.h>
 #include <unistd.h>
 
