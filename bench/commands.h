@@ -9,6 +9,7 @@ void step(const Options& options, Headline& headline);      // our step against 
 void worlds(const Options& options, Headline& headline);    // one world against two
 void response(const Options& options, Headline& headline);  // from a push until it shows
 void rollback(const Options& options, Headline& headline);  // repairing, computing ahead, and the window's memory
+void viewer(const Options& options, Headline& headline);    // what watching costs
 void latency(const Options& options, Headline& headline);   // what users notice
 
 }  // namespace soda::bench

@@ -16,6 +16,7 @@ constexpr Command kCommands[] = {
     {"step", "time and standing towers of our step against stock Bullet, side by side", soda::bench::step},
     {"worlds", "whole runs on one world and on two, over DDS", soda::bench::worlds},
     {"response", "from a user's push until it shows, in real time, over DDS", soda::bench::response},
+    {"viewer", "what watching costs worlds, gateway, network and browser", soda::bench::viewer},
     {"rollback", "repairs against computing all again; computing ahead; what the window takes of memory",
      soda::bench::rollback},
     {"latency", "a push in a city, and frames missed while first one world is slow and then the other",

@@ -1,7 +1,6 @@
 // `soda-bench response`: how long it takes from a user's push until it shows. A session in real time over DDS, one push
 // after another at random moments: until it is answered, until its step is displayed, and until the world has told
 // viewers a state of that step in which the body has the push's velocity.
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,6 +18,7 @@
 #include <vector>
 
 #include "bench/commands.h"
+#include "bench/program.h"
 #include "common/actions/action_proto.h"
 #include "common/dds/participant.h"
 #include "common/scene/generators.h"
@@ -31,32 +31,6 @@ using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 double ms(Clock::duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
-
-// A session started by `soda run`, ended with the object.
-class Run {
- public:
-  Run(const std::string& session, const std::filesystem::path& scene, int worlds, int lead) {
-    const std::string program = soda_program().string(), n = std::to_string(worlds), l = std::to_string(lead);
-    pid_ = fork();
-    if (pid_ < 0) throw std::runtime_error("cannot start soda");
-    if (pid_ == 0) {
-      (void)std::freopen("/dev/null", "w", stdout);
-      (void)std::freopen("/dev/null", "w", stderr);
-      execl(program.c_str(), "soda", "run", scene.c_str(), "--session", session.c_str(), "--worlds", n.c_str(),
-            "--input-lead", l.c_str(), "--steps", "1000000", "-q", nullptr);
-      _exit(127);
-    }
-  }
-  ~Run() {
-    kill(pid_, SIGINT);
-    waitpid(pid_, nullptr, 0);
-  }
-  Run(const Run&) = delete;
-  Run& operator=(const Run&) = delete;
-
- private:
-  pid_t pid_;
-};
 
 // What a client sees of a session.
 class Client {
@@ -154,7 +128,8 @@ void measure(const Options& options, int lead, Csv& csv, Headline& headline) {
   const std::string session = "response-" + std::to_string(getpid()) + "-" + std::to_string(lead);
   std::vector<double> answered, displayed, seen;
   {
-    const Run run(session, folder / "city.scene", 2, lead);
+    const Program run({"run", (folder / "city.scene").string(), "--session", session, "--worlds", "2", "--input-lead",
+                       std::to_string(lead), "--steps", "1000000", "-q"});
     Client client(session);
     if (!client.wait_running(60s)) throw std::runtime_error("the session does not start");
     std::mt19937 random(1);

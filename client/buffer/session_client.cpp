@@ -20,6 +20,21 @@ using namespace std::chrono_literals;
 constexpr auto kAskAgain = 1000ms;
 constexpr auto kAskAtMost = 10s;
 constexpr auto kLackAgain = 500ms;
+constexpr auto kGone = 15s;  // without a word of any world
+
+constexpr std::size_t kMostAsked = 512;
+constexpr std::size_t kMostQueued = std::size_t{128} << 20;  // bytes
+
+std::size_t bytes_of(const wire::Transforms& sample) {
+  return sizeof sample + sample.ids().size() * 77 + sample.gone().size() * 8;  // soda.idl
+}
+
+wire::Answer refusal(std::uint64_t number) {
+  wire::Answer nobody;
+  nobody.number(number);
+  nobody.reason("the session does not answer");
+  return nobody;
+}
 
 std::uint64_t random_client() {
   std::random_device device;
@@ -28,11 +43,9 @@ std::uint64_t random_client() {
 
 }  // namespace
 
-SessionClient::SessionClient(const dds::NetworkOptions& network, const std::string& session, Step history,
-                             std::function<void()> on_news, bool transforms)
+SessionClient::SessionClient(const dds::NetworkOptions& network, const std::string& session, Following following)
     : client_(random_client()),
-      history_(history),
-      on_news_(std::move(on_news)),
+      following_(std::move(following)),
       participant_(network, session, "soda-client"),
       requests_(participant_, dds::request_topic()),
       lacks_(participant_, dds::lack_topic()) {
@@ -41,7 +54,7 @@ SessionClient::SessionClient(const dds::NetworkOptions& network, const std::stri
   hear<wire::Status>(dds::status_topic());
   hear<wire::LogEntry>(dds::action_log_topic());
   hear<wire::Answer>(dds::answer_topic());
-  if (transforms) hear<wire::Transforms>(dds::transforms_topic());
+  if (following_.transforms) hear_transforms();
   hear<wire::Session>(dds::session_topic());
 }
 
@@ -55,21 +68,62 @@ void SessionClient::hear(const dds::Topic& topic) {
       queue_.emplace_back(std::move(sample));
     }
     changed_.notify_one();
-    if (on_news_) on_news_();
+    if (following_.on_news) following_.on_news();
   }));
+}
+
+// Nobody holds worlds up, so what is not taken in time cannot be kept without end.
+void SessionClient::hear_transforms() {
+  readers_.push_back(std::make_shared<dds::Reader<wire::Transforms>>(
+      participant_, dds::transforms_topic(), [this](wire::Transforms&& sample, const dds::WriterKey& writer) {
+        {
+          const std::lock_guard lock(mutex_);
+          queued_bytes_ += bytes_of(sample);
+          if (queued_bytes_ > kMostQueued) {
+            std::erase_if(queue_, [](const News& news) { return std::holds_alternative<Told>(news); });
+            queued_bytes_ = 0;
+            dropped_ = true;
+          } else {
+            queue_.emplace_back(Told{std::move(sample), writer});
+          }
+        }
+        changed_.notify_one();
+        if (following_.on_news) following_.on_news();
+      }));
 }
 
 void SessionClient::poll(std::chrono::milliseconds at_most) {
   std::deque<News> news;
+  bool dropped = false;
   {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, at_most, [this] { return !queue_.empty(); });
     news.swap(queue_);
+    queued_bytes_ = 0;
+    dropped = std::exchange(dropped_, false);
   }
   for (News& one : news) std::visit([this](auto& sample) { take(std::move(sample)); }, one);
   if (!scene_) assemble_scene();
   const auto now = Clock::now();
   ask_again(now);
+  if (dropped)
+    for (WorldId world = 0; world < worlds_.size(); ++world) lacking_.try_emplace(world, now - kLackAgain);
+  tell_lacks(now);
+  if (ended_.empty() && !worlds_.empty() && std::all_of(worlds_.begin(), worlds_.end(), [&](const World& world) {
+        return world.status && now - world.heard > kGone;
+      })) {
+    fail("nothing has been heard of the session for some time");
+    gone_ = true;
+  }
+  // A later session counts when ours is gone: if both are there, the later one gives way.
+  if (rival_ && (!ended_.empty() || worlds_[0].silent(now))) {
+    superseded_ = true;
+    if (ended_.empty()) ended_ = "another session of this name has begun";
+  }
+  if (buffer_) buffer_->release_before(displayed() - following_.history);
+}
+
+void SessionClient::tell_lacks(Clock::time_point now) {
   for (auto& [world, told] : lacking_) {
     if (now - told < kLackAgain) continue;
     told = now;
@@ -78,7 +132,6 @@ void SessionClient::poll(std::chrono::milliseconds at_most) {
     lack.world(world);
     (void)lacks_.write(lack);  // if that fails: soon again
   }
-  if (buffer_) buffer_->release_before(displayed() - history_);
 }
 
 template <class T>
@@ -89,19 +142,29 @@ bool SessionClient::mine(const T& sample) {
 // ---- what comes: samples may overtake each other between topics
 // ------------------------------------------------------
 
+void SessionClient::fail(std::string why) {
+  ended_ = std::move(why);
+  failed_ = true;
+}
+
 void SessionClient::take(wire::Session&& sample) {
+  if (sample.started() <= following_.after) return;
+  if (session_) {
+    rival_ = rival_ || (sample.instance() != session_->instance() && sample.started() > session_->started());
+    return;
+  }
   if (sample.protocol() != kProtocolVersion) {
     other_protocol_ = sample.protocol();
     return;
   }
-  if (session_) {
-    if (sample.instance() != session_->instance() && sample.started() > session_->started() && ended_.empty())
-      ended_ = "another session of this name has begun";
-    return;
-  }
   session_ = std::move(sample);
+  if (control_ && !mine(*control_)) control_.reset();
   worlds_.resize(session_->worlds());
+  tellers_.resize(session_->worlds());
   buffer_.emplace(session_->worlds());
+  // What has come before this was not taken, and may be all that there is for now.
+  if (following_.transforms)
+    for (WorldId world = 0; world < worlds_.size(); ++world) lacking_.emplace(world, Clock::now());
 }
 
 void SessionClient::take(wire::SceneChunk&& sample) {
@@ -118,13 +181,13 @@ void SessionClient::assemble_scene() {
   for (const std::string& chunk : chunks_) encoded += chunk;
   chunks_.clear();
   if (scene_hash(encoded) != session_->scene_hash()) {
-    ended_ = "the scene that the session hands out is not the one that it describes";
+    fail("the scene that the session hands out is not the one that it describes");
     return;
   }
   try {
     scene_ = std::make_shared<const Scene>(decode_scene(encoded, "the session's scene"));
   } catch (const std::exception& error) {
-    ended_ = error.what();
+    fail(error.what());
     return;
   }
   for (wire::LogEntry& entry : std::exchange(early_, {})) take(std::move(entry));
@@ -135,18 +198,25 @@ void SessionClient::take(wire::Control&& sample) {
   control_ = std::move(sample);
   if (!session_ || !ended_.empty()) return;
   if (control_->phase() == wire::PHASE_ENDED) ended_ = "the session has ended";
-  if (control_->phase() == wire::PHASE_FAILED) ended_ = "the session has failed: a world is gone for good";
+  if (control_->phase() == wire::PHASE_STOPPED) ended_ = "the session was stopped";
+  if (control_->phase() == wire::PHASE_FAILED) fail("the session has failed: a world is gone for good");
 }
 
 void SessionClient::take(wire::Status&& sample) {
   if (!mine(sample) || sample.world() >= worlds_.size()) return;
   World& world = worlds_[sample.world()];
+  superseded_ = superseded_ || gone_;
   world.status = std::move(sample);
   world.heard = Clock::now();
 }
 
-void SessionClient::take(wire::Transforms&& sample) {
+void SessionClient::take(Told&& told) {
+  const wire::Transforms& sample = told.sample;
   if (!mine(sample) || sample.world() >= worlds_.size()) return;
+  const auto now = Clock::now();
+  Teller& teller = tellers_[sample.world()];
+  if (teller.writer != told.writer && now - teller.heard < dds::kSilence) return;
+  teller = {told.writer, now};
   if (buffer_->add(sample))
     lacking_.erase(sample.world());
   else
@@ -183,28 +253,37 @@ std::uint64_t SessionClient::ask(wire::Request request) {
   request.number(++number_);
   if (session_) request.instance(session_->instance());
   const auto now = Clock::now();
-  (void)requests_.write(request);  // if that fails: soon again
+  if (asked_.size() >= kMostAsked) {
+    answers_.push_back(refusal(number_));
+    return number_;
+  }
   asked_.emplace(number_, Asked{std::move(request), now, now});
+  write_requests();
   return number_;
 }
 
+// In order: of a client that has asked for something, nothing is done that it has asked for before.
+void SessionClient::write_requests() {
+  for (auto at = asked_.upper_bound(written_); at != asked_.end() && requests_.write(at->second.request); ++at)
+    written_ = at->first;
+}
+
 void SessionClient::ask_again(Clock::time_point now) {
+  bool writable = true;
   for (auto at = asked_.begin(); at != asked_.end();) {
     Asked& asked = at->second;
     if (now - asked.first > kAskAtMost) {
-      wire::Answer nobody;
-      nobody.number(at->first);
-      nobody.reason("the session does not answer");
-      answers_.push_back(std::move(nobody));
+      answers_.push_back(refusal(at->first));
       at = asked_.erase(at);
       continue;
     }
-    if (now - asked.last > kAskAgain) {
+    if (now - asked.last > kAskAgain && at->first <= written_ && writable) {
       asked.last = now;
-      (void)requests_.write(asked.request);  // it is done once, however often it arrives
+      writable = requests_.write(asked.request);  // it is done once, however often it arrives
     }
     ++at;
   }
+  if (writable) write_requests();
 }
 
 std::vector<wire::Answer> SessionClient::take_answers() { return std::exchange(answers_, {}); }

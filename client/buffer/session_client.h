@@ -30,6 +30,16 @@
 
 namespace soda::buffer {
 
+// How a session is followed.
+struct Following {
+  Step history = 120;  // steps before the displayed one that are kept
+  // Called from threads of DDS whenever something has come: to wake whoever will call poll().
+  std::function<void()> on_news = {};
+  bool transforms = true;  // otherwise the buffer stays empty, and the worlds need not tell of bodies
+  // Only a session that has begun after this one (wire::Session::started): to follow the next one of a name.
+  std::int64_t after = 0;
+};
+
 class SessionClient {
  public:
   using Clock = std::chrono::steady_clock;
@@ -39,11 +49,8 @@ class SessionClient {
     bool silent(Clock::time_point now) const { return !status || now - heard > dds::kSilence; }
   };
 
-  // `on_news` is called from threads of DDS whenever something has come: to wake whoever will call poll().
-  // `history`: steps before the displayed one that are kept. Without `transforms` the buffer stays empty, and the
-  // worlds need not tell of bodies. Throws as dds::Participant.
-  SessionClient(const dds::NetworkOptions& network, const std::string& session, Step history = 120,
-                std::function<void()> on_news = nullptr, bool transforms = true);
+  // Throws as dds::Participant.
+  SessionClient(const dds::NetworkOptions& network, const std::string& session, Following following = {});
   ~SessionClient();
 
   // Takes what has come, waiting for it as long as that if nothing has.
@@ -60,6 +67,11 @@ class SessionClient {
   std::uint32_t other_protocol() const { return other_protocol_; }
   // Why nothing more will come, or "": the session has ended, or failed; another one of its name has begun.
   const std::string& ended() const { return ended_; }
+  bool failed() const { return failed_; }  // it has not ended as it should
+  // Another session of its name has begun after it, or this one is heard of again after all. A client that is made with
+  // Following::after as next() says follows that.
+  bool superseded() const { return superseded_; }
+  std::int64_t next() const { return session_ ? session_->started() - (gone_ ? 1 : 0) : following_.after; }
 
   // Bodies that were spawned so far, in the order in which that was heard.
   struct Spawned {
@@ -75,21 +87,29 @@ class SessionClient {
   std::vector<wire::Answer> take_answers();
 
  private:
-  using News = std::variant<wire::Session, wire::SceneChunk, wire::Control, wire::Status, wire::LogEntry, wire::Answer,
-                            wire::Transforms>;
+  struct Told {  // by one of the session's participants
+    wire::Transforms sample;
+    dds::WriterKey writer;
+  };
+  using News =
+      std::variant<wire::Session, wire::SceneChunk, wire::Control, wire::Status, wire::LogEntry, wire::Answer, Told>;
   template <class T>
   void hear(const dds::Topic& topic);
+  void hear_transforms();
   void take(wire::Session&& sample);
   void take(wire::SceneChunk&& sample);
   void take(wire::Control&& sample);
   void take(wire::Status&& sample);
   void take(wire::LogEntry&& sample);
   void take(wire::Answer&& sample);
-  void take(wire::Transforms&& sample);
+  void take(Told&& told);
   template <class T>
   bool mine(const T& sample);
   void assemble_scene();
+  void fail(std::string why);
+  void write_requests();
   void ask_again(Clock::time_point now);
+  void tell_lacks(Clock::time_point now);
 
   struct Asked {
     wire::Request request;
@@ -97,11 +117,12 @@ class SessionClient {
   };
 
   const std::uint64_t client_;
-  const Step history_;
-  const std::function<void()> on_news_;
-  std::mutex mutex_;  // guards queue_
+  const Following following_;
+  std::mutex mutex_;  // guards the next four
   std::condition_variable changed_;
   std::deque<News> queue_;
+  std::size_t queued_bytes_ = 0;  // of transforms
+  bool dropped_ = false;          // some of them were more than could be kept
 
   std::optional<wire::Session> session_;
   std::optional<wire::Control> control_;
@@ -110,12 +131,20 @@ class SessionClient {
   std::vector<World> worlds_;
   std::optional<TransformBuffer> buffer_;
   std::map<WorldId, Clock::time_point> lacking_;  // worlds whose samples were missed: when that was told
+  struct Teller {
+    dds::WriterKey writer{};
+    Clock::time_point heard{};
+  };
+  std::vector<Teller> tellers_;  // by world: who tells of it; nobody else is believed
   std::vector<Spawned> spawned_;
   std::set<std::uint64_t> logged_;    // entries of the action log that were heard
   std::deque<wire::LogEntry> early_;  // of them, those heard before the scene
   std::uint32_t other_protocol_ = 0;
   std::string ended_;
-  std::uint64_t number_ = 0;
+  bool failed_ = false, superseded_ = false;
+  bool gone_ = false;   // nothing was heard of it for long, and it was given up
+  bool rival_ = false;  // a later session of this name has been heard of
+  std::uint64_t number_ = 0, written_ = 0;
   std::map<std::uint64_t, Asked> asked_;
   std::vector<wire::Answer> answers_;
 

@@ -40,6 +40,7 @@ bool TransformBuffer::add(const wire::Transforms& sample) {
     world.entries[static_cast<std::size_t>(step - world.first)] = std::move(whole);
   } else if (!follows) {
     world.number = 0;
+    world.front = std::min(world.front, world.final_step);  // of the rest a repair may have begun
     return false;
   } else if (step > world.first && step <= world.last() + 1 && sample.kind() == wire::VIEW_STEP) {
     if (step > world.last()) world.entries.emplace_back();

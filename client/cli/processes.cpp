@@ -44,7 +44,7 @@ struct Processes::Process {
 
 Processes::Processes(LineHandler on_line) : on_line_(std::move(on_line)) {}
 
-Processes::~Processes() { stop(std::chrono::seconds(2)); }
+Processes::~Processes() { stop(SIGTERM, std::chrono::seconds(2)); }
 
 void Processes::start(const std::string& name, const std::string& program, const std::vector<std::string>& arguments,
                       const std::vector<std::pair<int, int>>& inherited) {
@@ -122,12 +122,12 @@ std::size_t Processes::running() const {
       std::count_if(processes_.begin(), processes_.end(), [](const auto& process) { return process->running; }));
 }
 
-void Processes::stop(std::chrono::milliseconds patience, const std::function<void()>& meanwhile) {
+void Processes::stop(int signal, std::chrono::milliseconds patience, const std::function<void()>& meanwhile) {
   const auto signal_all = [this](int number) {
     for (const auto& process : processes_)
       if (process->running) ::kill(process->pid, number);
   };
-  signal_all(SIGTERM);
+  signal_all(signal);
   signal_all(SIGCONT);  // a stopped process would not hear of it
   const auto until = std::chrono::steady_clock::now() + patience;
   bool killed = false;

@@ -37,8 +37,8 @@ class Processes {
   // Reads what was written and says who has ended since the last call. Does not block.
   std::vector<Ended> poll();
   std::size_t running() const;
-  // Asks all to end (SIGTERM), and after that long makes them (SIGKILL). `meanwhile` is called again and again.
-  void stop(std::chrono::milliseconds patience, const std::function<void()>& meanwhile = nullptr);
+  // Asks all to end by `signal`, and after that long makes them (SIGKILL). `meanwhile` is called again and again.
+  void stop(int signal, std::chrono::milliseconds patience, const std::function<void()>& meanwhile = nullptr);
 
  private:
   struct Process;

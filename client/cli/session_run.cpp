@@ -1,6 +1,7 @@
 #include "client/cli/session_run.h"
 
 #include <chrono>
+#include <csignal>
 #include <utility>
 
 #include "client/cli/stats_file.h"
@@ -102,7 +103,8 @@ int follow(ReportSource& source, Processes& processes, Table& table, StopSignals
   table.clear();
   const bool complete = collector.complete();
   // A daemon may be waiting for room in its pipe.
-  processes.stop(kStopAtMost, [&] {
+  // World 0 tells viewers which of the two it was.
+  processes.stop(signals.received() != 0 ? SIGINT : SIGTERM, kStopAtMost, [&] {
     while (source.next(0ms)) {
     }
   });

@@ -80,7 +80,7 @@ constexpr auto kPatience = 5s;
 template <typename Tell>
 bool follow_status(const StatusOptions& options, const StopSignals& signals, Tell&& tell) {
   dds::check_session_name(options.session);
-  viewer::LiveSource source(options.network, options.session, 1, nullptr, false);
+  viewer::LiveSource source(options.network, options.session, {.history = 1, .transforms = false});
   const auto began = Clock::now();
   const auto wait = [&](Clock::time_point until, auto&& done) {
     while (signals.received() == 0 && Clock::now() < until && !done()) {
@@ -92,20 +92,20 @@ bool follow_status(const StatusOptions& options, const StopSignals& signals, Tel
     const view::Clocks clocks = source.clocks();
     bool all = source.ready() && clocks.world_size() > 0;
     for (const view::WorldClock& world : clocks.world()) all = all && !world.silent();
-    return all || !source.ended().empty();
+    return all || source.ended();
   });
   if (signals.received() != 0) return true;
   if (!source.ready()) {
-    const std::string why = source.ended();
+    const auto end = source.ended();
     std::fprintf(stderr, "error: %s\n",
-                 why.empty() ? ("nobody is there in session '" + options.session + "'").c_str() : why.c_str());
+                 end ? end->reason.c_str() : ("nobody is there in session '" + options.session + "'").c_str());
     return false;
   }
   (void)source.worlds();
   do {
-    wait(Clock::now() + kEvery, [&] { return !source.ended().empty(); });
+    wait(Clock::now() + kEvery, [&] { return source.ended().has_value(); });
     if (!tell(source.clocks(), source.worlds())) return true;
-  } while (signals.received() == 0 && source.ended().empty());
+  } while (signals.received() == 0 && !source.ended());
   return true;
 }
 

@@ -38,16 +38,22 @@ std::string random_token() {
 
 bool is_loopback(const std::string& address) { return address.rfind("127.", 0) == 0 || address == "::1"; }
 
-// Opens the gateway and says where.
-std::unique_ptr<viewer::Gateway> open(ViewOptions& options, const viewer::StaticFiles& files, const std::string& what) {
+// Opens the gateway and says where. `open_to_all`: where no token is asked for, none is needed to act.
+std::unique_ptr<viewer::Gateway> open(ViewOptions& options, const viewer::StaticFiles& files, const std::string& what,
+                                      bool open_to_all) {
   if (options.read_only)
     options.http.token.clear();
+  else if (options.http.token.empty() && open_to_all)
+    options.http.open_to_all = true;
   else if (options.http.token.empty())
     options.http.token = random_token();
   auto gateway = std::make_unique<viewer::Gateway>(options.http, files);
   const std::string host = is_loopback(options.http.address) ? "localhost" : options.http.address;
   const std::string token = options.http.token.empty() ? "" : "?token=" + options.http.token;
-  std::printf("%s can be watched%s at  http://%s:%u/%s\n", what.c_str(), token.empty() ? "" : " and acted on",
+  std::printf("%s can be watched%s at  http://%s:%u/%s\n", what.c_str(),
+              token.empty()               ? ""
+              : options.recording.empty() ? " and acted on"
+                                          : " and controlled",
               host.c_str(), static_cast<unsigned>(gateway->port()), token.c_str());
   std::fflush(stdout);
   return gateway;
@@ -61,9 +67,14 @@ int view(ViewOptions options) {
   dds::check_session_name(options.session);
   StopSignals signals;
   const viewer::StaticFiles files(page_of(options));
-  const auto gateway = open(options, files, "session '" + options.session + "'");
-  viewer::LiveSource source(options.network, options.session, options.history, [&] { gateway->wake(); });
-  gateway->run(source, [&] { return signals.received() != 0; });
+  const auto gateway = open(options, files, "session '" + options.session + "'", false);
+  std::int64_t after = 0;  // sessions of this name follow one another
+  while (signals.received() == 0) {
+    viewer::LiveSource source(options.network, options.session,
+                              {.history = options.history, .on_news = [&] { gateway->wake(); }, .after = after});
+    gateway->run(source, [&] { return signals.received() != 0 || source.superseded(); });
+    after = source.next();
+  }
   return kExitOk;
 }
 
@@ -71,7 +82,7 @@ int replay(ViewOptions options) {
   StopSignals signals;
   const viewer::StaticFiles files(page_of(options));
   viewer::ReplaySource source(options.recording);
-  const auto gateway = open(options, files, options.recording);
+  const auto gateway = open(options, files, options.recording, true);
   gateway->run(source, [&] { return signals.received() != 0; });
   return kExitOk;
 }

@@ -12,6 +12,8 @@ namespace {
 static_assert(view::FLAG_ASLEEP == wire::VIEW_ASLEEP && view::FLAG_NEAR == wire::VIEW_NEAR &&
               view::FLAG_MIXED == wire::VIEW_MIXED);
 
+constexpr double kFarthest = 1e30;  // m: a float has it, and farther than anybody looks
+
 double seconds_since(std::int64_t ns) {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return 1e-9 * static_cast<double>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count() - ns);
@@ -49,8 +51,16 @@ std::optional<view::Frame> FrameMaker::next(const buffer::View& view, const buff
       for (std::uint32_t body = 0; body < listed; ++body)
         if (flash_[body] && !sent_[body])
           if (const buffer::Pose* pose = view.worlds[world].get(body)) add(frame, body, *pose, world);
-  for (const std::uint32_t body : gone_)  // or gone over to another world
-    if (!sent_[body]) append(*frame.mutable_gone(), body);
+  for (const std::uint32_t body : gone_) {
+    if (sent_[body]) continue;  // it has gone over to another world
+    // Or another one has shown it, too, and still does.
+    const auto other = std::find_if(view.worlds.begin(), view.worlds.end(),
+                                    [&](const buffer::Poses& poses) { return poses.get(body) != nullptr; });
+    if (other == view.worlds.end())
+      append(*frame.mutable_gone(), body);
+    else
+      add(frame, body, *other->get(body), static_cast<WorldId>(other - view.worlds.begin()));
+  }
   const bool news = frame.whole() || view.step != shown_.step || view.anticipated != shown_.anticipated ||
                     !frame.index().empty() || !frame.gone().empty();
   shown_ = view;
@@ -65,7 +75,8 @@ std::optional<view::Frame> FrameMaker::next(const buffer::View& view, const buff
 void FrameMaker::add(view::Frame& frame, std::uint32_t body, const buffer::Pose& pose, WorldId world) {
   sent_[body] = 1;
   append(*frame.mutable_index(), body);
-  for (const double x : pose.position) append(*frame.mutable_position(), static_cast<float>(x));
+  for (const double x : pose.position)
+    append(*frame.mutable_position(), static_cast<float>(std::clamp(x, -kFarthest, kFarthest)));
   for (const float q : pose.orientation)
     append(*frame.mutable_orientation(), static_cast<std::int16_t>(std::lround(32767 * std::clamp(q, -1.0f, 1.0f))));
   const double speed = std::hypot(pose.linear[0], pose.linear[1], pose.linear[2]);

@@ -14,6 +14,8 @@ class FrameMaker {
  public:
   // The next frame has everything.
   void begin_anew() { shown_ = {}; }
+  // So does it, and is of another buffer.
+  void begin_another() { shown_ = {}, redone_ = 0; }
 
   // Of bodies with an index below `listed`. Nothing where it would say nothing new.
   std::optional<view::Frame> next(const buffer::View& view, const buffer::TransformBuffer& buffer,

@@ -18,9 +18,13 @@ constexpr std::size_t kMostPages = 64;
 Gateway::Gateway(const HttpOptions& options, const StaticFiles& files) : timer_(io_) {
   PageLink::Handlers handlers;
   handlers.wants = [this](PageLink& page, const view::Do& wanted) { wants(page, wanted); };
-  handlers.closed = [this](PageLink& page) { pages_.erase(&page); };
-  server_ = std::make_unique<HttpServer>(io_, options, files, std::move(handlers),
-                                         [this](std::shared_ptr<PageLink> page) { add(std::move(page)); });
+  handlers.closed = [this](PageLink& page) {
+    for (const std::uint64_t grab : page.grabs) release(grab);
+    pages_.erase(&page);
+  };
+  server_ = std::make_unique<HttpServer>(
+      io_, options, files, std::move(handlers), [this] { return pages_.size() < kMostPages; },
+      [this](std::shared_ptr<PageLink> page) { add(std::move(page)); });
 }
 
 void Gateway::add(std::shared_ptr<PageLink> page) {
@@ -39,8 +43,15 @@ void Gateway::wake() {
 void Gateway::run(Source& source, const std::function<bool()>& stop) {
   source_ = &source;
   stop_ = stop;
+  asked_.clear();
+  for (const auto& [key, page] : pages_) {
+    page->forget();
+    page->grabs.clear();
+  }
+  io_.restart();
   tick();
   io_.run();
+  source_ = nullptr;
 }
 
 void Gateway::tick() {
@@ -64,7 +75,12 @@ void Gateway::look() {
     const auto asked = asked_.extract(tag);
     if (asked.empty()) continue;
     const auto page = asked.mapped().page.lock();
-    if (!page) continue;
+    const bool grabbed = asked.mapped().grab && answer.accepted();
+    if (!page || !pages_.contains(page.get())) {
+      if (grabbed) release(answer.logged());
+      continue;
+    }
+    if (grabbed) page->grabs.insert(answer.logged());
     view::ToPage message;
     *message.mutable_answer() = std::move(answer);
     message.mutable_answer()->set_number(asked.mapped().number);
@@ -80,13 +96,8 @@ void Gateway::look() {
     for (std::string& text : news.events) message.mutable_events()->add_text(std::move(text));
     tell_all(message);
   }
-  std::size_t number = 0;
   const auto pages = pages_;  // a page may go away meanwhile
   for (const auto& [key, page] : pages) {
-    if (++number > kMostPages) {
-      page->close(boost::beast::websocket::close_code::try_again_later, "too many pages watch already");
-      continue;
-    }
     if (!page->is_open()) continue;
     if (!page->welcomed() && source_->ready()) page->welcome(*source_);
     page->tell_bodies(*source_);
@@ -106,14 +117,22 @@ void Gateway::look() {
     for (const auto& [key, page] : pages)
       if (page->welcomed()) page->tell_newest(message);
   }
-  if (const std::string ended = source_->ended(); !ended.empty())
-    for (const auto& [key, page] : pages) page->tell_ended(ended);
+  if (const auto end = source_->ended())
+    for (const auto& [key, page] : pages) page->tell_ended(*end);
+}
+
+void Gateway::release(std::uint64_t grab) {
+  if (!source_ || !source_->ready()) return;
+  view::Do wanted;
+  wanted.mutable_action()->mutable_release()->set_grab(grab);
+  (void)source_->ask(wanted);
 }
 
 void Gateway::wants(PageLink& page, const view::Do& wanted) {
+  if (wanted.action().has_release()) page.grabs.erase(wanted.action().release().grab());
   const std::uint64_t tag = source_->ready() ? source_->ask(wanted) : 0;
   if (tag != 0) {
-    asked_[tag] = {page.weak_from_this(), wanted.number()};
+    asked_[tag] = {page.weak_from_this(), wanted.number(), wanted.action().has_grab()};
     return;
   }
   view::ToPage message;

@@ -19,13 +19,13 @@ namespace soda::viewer {
 
 class Gateway {
  public:
-  // Listens at once. Throws std::runtime_error as HttpServer. `source` may be set later, but before run().
+  // Listens at once. Throws std::runtime_error as HttpServer.
   Gateway(const HttpOptions& options, const StaticFiles& files);
 
   std::uint16_t port() const { return server_->port(); }
   // From any thread: the source has news.
   void wake();
-  // Serves until `stop` says so, which is asked some times a second.
+  // Serves until `stop` says so, which is asked some times a second. Once more with another source: the pages stay.
   void run(Source& source, const std::function<bool()>& stop);
 
  private:
@@ -44,7 +44,9 @@ class Gateway {
   struct Asked {
     std::weak_ptr<PageLink> page;
     std::uint32_t number = 0;
+    bool grab = false;  // of a body
   };
+  void release(std::uint64_t grab);       // that nobody holds any more
   std::map<std::uint64_t, Asked> asked_;  // by the source's tag
   std::atomic<bool> woken_{false};
   Clock::time_point clocks_at_{}, worlds_at_{};

@@ -17,6 +17,8 @@ namespace http = beast::http;
 using asio::ip::tcp;
 
 constexpr std::chrono::seconds kPatience{30};
+constexpr std::chrono::seconds kAcceptAgain{1};
+constexpr int kMostLinks = 256;
 constexpr std::uint32_t kLargestHeader = 16 * 1024;  // bytes
 
 // Takes as long for any wrong token.
@@ -27,12 +29,15 @@ bool same_secret(const std::string& l, const std::string& r) {
   return difference == 0;
 }
 
+}  // namespace
+
 // One connection of a browser, until it becomes a page's.
 class HttpLink : public std::enable_shared_from_this<HttpLink> {
  public:
-  HttpLink(tcp::socket socket, const HttpOptions& options, const StaticFiles& files, const PageLink::Handlers& handlers,
-           const HttpServer::NewPage& on_page)
-      : stream_(std::move(socket)), options_(options), files_(files), handlers_(handlers), on_page_(on_page) {}
+  HttpLink(tcp::socket socket, HttpServer& server) : stream_(std::move(socket)), server_(server) { ++server_.links_; }
+  ~HttpLink() { --server_.links_; }
+  HttpLink(const HttpLink&) = delete;
+  HttpLink& operator=(const HttpLink&) = delete;
 
   void read() {
     parser_.emplace();
@@ -49,17 +54,24 @@ class HttpLink : public std::enable_shared_from_this<HttpLink> {
     const PageLink::Request request = parser_->release();
     const std::string target(request.target());
     const std::string path = target.substr(0, target.find('?'));
+    const HttpOptions& options = server_.options_;
+    if (server_.local_ && !host_is_loopback(request))
+      return send(request, http::status::forbidden, "this viewer is for this machine alone\n");
     if (beast::websocket::is_upgrade(request)) {
       if (path != "/ws") return send(request, http::status::not_found, "there is no such thing here\n");
       if (!same_origin(request)) return send(request, http::status::forbidden, "pages of others may not connect\n");
-      const bool may_act = !options_.token.empty() && same_secret(query_value(target, "token"), options_.token);
-      const auto page = std::make_shared<PageLink>(stream_.release_socket(), may_act, handlers_);
-      on_page_(page);
+      if (!server_.has_room_())
+        return send(request, http::status::service_unavailable, "too many pages watch already\n");
+      const bool has_token = !options.token.empty() && same_secret(query_value(target, "token"), options.token);
+      const bool may_act = options.open_to_all || has_token;
+      const auto page = std::make_shared<PageLink>(stream_.release_socket(), may_act, server_.handlers_);
+      server_.on_page_(page);
       return page->accept(request);
     }
     if (request.method() != http::verb::get && request.method() != http::verb::head)
       return send(request, http::status::method_not_allowed, "only GET and HEAD\n");
-    if (const StaticFile* file = files_.find(path)) return send(request, http::status::ok, file->bytes, file->type);
+    if (const StaticFile* file = server_.files_.find(path))
+      return send(request, http::status::ok, file->bytes, file->type);
     send(request, http::status::not_found, "there is no such thing here\n");
   }
 
@@ -90,21 +102,25 @@ class HttpLink : public std::enable_shared_from_this<HttpLink> {
   }
 
   beast::tcp_stream stream_;
-  const HttpOptions& options_;
-  const StaticFiles& files_;
-  const PageLink::Handlers& handlers_;
-  const HttpServer::NewPage& on_page_;
+  HttpServer& server_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
 };
-
-}  // namespace
 
 bool same_origin(const PageLink::Request& request) {
   const std::string origin(request[http::field::origin]);
   if (origin.empty()) return true;  // no browser
   const std::size_t scheme = origin.find("://");
   return scheme != std::string::npos && origin.substr(scheme + 3) == request[http::field::host];
+}
+
+bool host_is_loopback(const PageLink::Request& request) {
+  const std::string host(request[http::field::host]);
+  if (host.empty()) return true;  // no browser
+  const std::string name = host.front() == '[' ? host.substr(0, host.find(']') + 1) : host.substr(0, host.find(':'));
+  boost::system::error_code error;
+  const auto address = asio::ip::make_address_v4(name, error);
+  return name == "localhost" || name == "[::1]" || (!error && address.is_loopback());
 }
 
 std::string query_value(const std::string& target, const std::string& name) {
@@ -119,11 +135,18 @@ std::string query_value(const std::string& target, const std::string& name) {
 }
 
 HttpServer::HttpServer(asio::io_context& io, const HttpOptions& options, const StaticFiles& files,
-                       PageLink::Handlers handlers, NewPage on_page)
-    : options_(options), files_(files), handlers_(std::move(handlers)), on_page_(std::move(on_page)), acceptor_(io) {
+                       PageLink::Handlers handlers, HasRoom has_room, NewPage on_page)
+    : options_(options),
+      files_(files),
+      handlers_(std::move(handlers)),
+      has_room_(std::move(has_room)),
+      on_page_(std::move(on_page)),
+      acceptor_(io),
+      again_(io) {
   beast::error_code error;
   const asio::ip::address address = asio::ip::make_address(options.address, error);
   if (error) throw std::runtime_error("'" + options.address + "' is not an IP address");
+  local_ = address.is_loopback();
   const tcp::endpoint endpoint(address, options.port);
   acceptor_.open(endpoint.protocol());
   acceptor_.set_option(tcp::acceptor::reuse_address(true));
@@ -138,11 +161,14 @@ HttpServer::HttpServer(asio::io_context& io, const HttpOptions& options, const S
 void HttpServer::accept() {
   acceptor_.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (error)
-      spdlog::warn("a connection could not be taken: {}", error.message());
-    else
-      std::make_shared<HttpLink>(std::move(socket), options_, files_, handlers_, on_page_)->read();
-    accept();
+    if (!error && links_ < kMostLinks) std::make_shared<HttpLink>(std::move(socket), *this)->read();
+    if (!error) return accept();
+    // Too many files are open, perhaps: that does not pass at once.
+    spdlog::warn("a connection could not be taken: {}", error.message());
+    again_.expires_after(kAcceptAgain);
+    again_.async_wait([this](beast::error_code cancelled) {
+      if (!cancelled) accept();
+    });
   });
 }
 

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/run_settings.h"
+
 namespace soda::viewer {
 namespace {
 
 using namespace std::chrono_literals;
+
+constexpr auto kPatience = 1s;  // for news of how a body looks
 
 double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
@@ -25,9 +29,8 @@ const char* state_name(std::uint8_t state) {
 
 }  // namespace
 
-LiveSource::LiveSource(const dds::NetworkOptions& network, const std::string& session, Step history,
-                       std::function<void()> on_news, bool transforms)
-    : session_(session), client_(network, session, history, std::move(on_news), transforms) {}
+LiveSource::LiveSource(const dds::NetworkOptions& network, const std::string& session, buffer::Following following)
+    : session_(session), client_(network, session, std::move(following)) {}
 
 News LiveSource::poll() {
   client_.poll(0ms);
@@ -40,7 +43,10 @@ News LiveSource::poll() {
     const auto& spawned = client_.spawned();
     for (; spawned_ < spawned.size(); ++spawned_) model_->add(spawned[spawned_].id, *spawned[spawned_].shape);
     const buffer::BodyIndex& heard = client_.buffer()->bodies();
-    while (bodies_.size() < heard.size() && model_->has(heard.id(listed()))) bodies_.push_back(heard.id(listed()));
+    const auto now = Clock::now();
+    if (bodies_.size() == heard.size() || model_->has(heard.id(listed()))) stuck_ = now;
+    while (bodies_.size() < heard.size() && (model_->has(heard.id(listed())) || now - stuck_ > kPatience))
+      bodies_.push_back(heard.id(listed()));
     watch_worlds(news);
   }
   note_speed();
@@ -192,11 +198,13 @@ view::WorldState LiveSource::state_of(WorldId w, Clock::time_point now) {
   return state;
 }
 
-std::string LiveSource::ended() const {
+std::optional<End> LiveSource::ended() const {
   if (client_.other_protocol() != 0)
-    return "session '" + session_ + "' speaks version " + std::to_string(client_.other_protocol()) +
-           " of the protocol, this viewer another: use the same build everywhere";
-  return client_.ended();
+    return End{"session '" + session_ + "' speaks version " + std::to_string(client_.other_protocol()) +
+                   " of the protocol, this viewer another: use the same build everywhere",
+               true};
+  if (client_.ended().empty()) return std::nullopt;
+  return End{client_.ended(), client_.failed()};
 }
 
 std::uint64_t LiveSource::ask(const view::Do& wanted) {
@@ -216,11 +224,11 @@ std::uint64_t LiveSource::ask(const view::Do& wanted) {
       break;
     case view::Do::kSteps:
       request.kind(wire::REQUEST_STEP);
-      request.value(static_cast<double>(std::max<std::int64_t>(0, wanted.steps())));
+      request.value(std::clamp(static_cast<double>(wanted.steps()), 0.0, kLargestPace));
       break;
     case view::Do::kSpeed:
       request.kind(wire::REQUEST_SPEED);
-      request.value(wanted.speed() >= 0 ? wanted.speed() : 0);  // not a number, too
+      request.value(wanted.speed() >= 0 ? std::min(wanted.speed(), kLargestPace) : 0);  // not a number, too
       break;
     default:
       return 0;

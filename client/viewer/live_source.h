@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <deque>
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -17,9 +16,7 @@ namespace soda::viewer {
 
 class LiveSource final : public Source {
  public:
-  // `on_news` and `transforms` as for SessionClient. `history`: steps in the past that can be shown.
-  LiveSource(const dds::NetworkOptions& network, const std::string& session, Step history,
-             std::function<void()> on_news, bool transforms = true);
+  LiveSource(const dds::NetworkOptions& network, const std::string& session, buffer::Following following);
 
   News poll() override;
   bool ready() const override { return model_ != nullptr; }
@@ -30,7 +27,10 @@ class LiveSource final : public Source {
   Step displayed() const override { return client_.displayed(); }
   view::Clocks clocks() const override;
   view::Worlds worlds() override;
-  std::string ended() const override;
+  std::optional<End> ended() const override;
+  // As SessionClient says.
+  bool superseded() const { return client_.superseded(); }
+  std::int64_t next() const { return client_.next(); }
   std::uint64_t ask(const view::Do& wanted) override;
 
  private:
@@ -49,7 +49,8 @@ class LiveSource final : public Source {
   const std::string session_;
   buffer::SessionClient client_;
   std::unique_ptr<SceneModel> model_;
-  std::vector<BodyId> bodies_;  // by index, as far as their looks are known
+  std::vector<BodyId> bodies_;  // by index, as far as their looks are known, or have not become known for a while
+  Clock::time_point stuck_{};   // since then the next one's are not
   std::size_t spawned_ = 0;     // bodies of the log that the model has
   std::vector<Watched> watched_;
   std::deque<std::pair<Clock::time_point, Step>> displayed_;  // of the last second

@@ -12,11 +12,12 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 
-constexpr std::uint32_t kProtocol = 1;                       // of viewer.proto
+constexpr std::uint32_t kProtocol = 2;                       // of viewer.proto
 constexpr std::size_t kLargestIncoming = 256 * 1024;         // bytes
 constexpr std::size_t kMostWaiting = std::size_t{64} << 20;  // bytes, beside what can be replaced
 constexpr double kMessagesPerSecond = 240, kBurst = 480;
 constexpr std::uint32_t kFramesUnshown = 3;
+constexpr std::int64_t kFarthestLook = std::int64_t{1} << 40;  // steps
 
 }  // namespace
 
@@ -70,6 +71,8 @@ void PageLink::take(const view::FromPage& message) {
   switch (message.what_case()) {
     case view::FromPage::kLook:
       look_ = message.look();
+      if (look_.which_case() == view::Look::kOffset)
+        look_.set_offset(std::clamp(look_.offset(), -kFarthestLook, kFarthestLook));
       break;
     case view::FromPage::kShown:
       shown_ = std::max(shown_, std::min(message.shown().number(), frames_.number()));
@@ -110,13 +113,17 @@ void PageLink::welcome(const Source& source) {
   message.mutable_welcome()->set_may_act(may_act_);
   meshes_ = static_cast<std::uint32_t>(message.welcome().meshes_size());
   listed_ = 0;
+  told_bodies_ = false;
+  look_.set_offset(0);
+  frames_.begin_another();
   welcomed_ = true;
   tell(std::move(message));
   tell_bodies(source);
 }
 
 void PageLink::tell_bodies(const Source& source) {
-  if (!welcomed_ || (listed_ == source.listed() && listed_ > 0)) return;
+  if (!welcomed_ || (told_bodies_ && listed_ == source.listed())) return;
+  told_bodies_ = true;
   view::ToPage message;
   *message.mutable_bodies() = source.bodies(listed_, meshes_);
   listed_ = source.listed();
@@ -134,10 +141,11 @@ void PageLink::show(const Source& source) {
   tell(std::move(message));
 }
 
-void PageLink::tell_ended(const std::string& reason) {
+void PageLink::tell_ended(const End& end) {
   if (!open_ || std::exchange(ended_, true)) return;
   view::ToPage message;
-  message.mutable_ended()->set_reason(reason);
+  message.mutable_ended()->set_reason(end.reason);
+  message.mutable_ended()->set_failed(end.failed);
   tell(std::move(message));
 }
 
@@ -145,7 +153,9 @@ void PageLink::tell(view::ToPage message) {
   if (!open_ || closing_) return;
   queue_.push_back(message.SerializeAsString());
   queued_bytes_ += queue_.back().size();
-  if (queued_bytes_ > kMostWaiting) return close(websocket::close_code::try_again_later, "the page is too slow");
+  // A scene may be larger than that, and nothing waits before it.
+  if (queued_bytes_ > kMostWaiting && (writing_ || queue_.size() > 1))
+    return close(websocket::close_code::try_again_later, "the page is too slow");
   write();
 }
 

@@ -13,6 +13,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "client/viewer/frame_maker.h"
@@ -33,15 +34,18 @@ class PageLink : public std::enable_shared_from_this<PageLink> {
   void close(boost::beast::websocket::close_code code, const std::string& reason);
 
   bool may_act() const { return may_act_; }
+  // Numbers of the grabs that it has not released: what it drags.
+  std::set<std::uint64_t> grabs;
   bool is_open() const { return open_; }
   bool welcomed() const { return welcomed_; }
-  // Tells the scene. Before that, nothing else should be told.
+  // Tells the scene. Before that, nothing else should be told. Once more when another source is to be shown.
   void welcome(const Source& source);
-  void tell_bodies(const Source& source);      // those that it has not been told
-  void show(const Source& source);             // a frame, if there is something new and the page is ready for it
-  void tell_ended(const std::string& reason);  // once
-  void tell(view::ToPage message);             // surely, in order
-  void tell_newest(view::ToPage message);      // in place of one of its kind that waits
+  void forget() { welcomed_ = ended_ = false; }  // its source is gone
+  void tell_bodies(const Source& source);        // those that it has not been told
+  void show(const Source& source);               // a frame, if there is something new and the page is ready for it
+  void tell_ended(const End& end);               // once
+  void tell(view::ToPage message);               // surely, in order
+  void tell_newest(view::ToPage message);        // in place of one of its kind that waits
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -55,7 +59,7 @@ class PageLink : public std::enable_shared_from_this<PageLink> {
   const bool may_act_;
   Handlers handlers_;
   boost::beast::flat_buffer incoming_;
-  bool open_ = false, welcomed_ = false, writing_ = false, closing_ = false, ended_ = false;
+  bool open_ = false, welcomed_ = false, told_bodies_ = false, writing_ = false, closing_ = false, ended_ = false;
   std::string outgoing_;  // being written
   std::deque<std::string> queue_;
   std::size_t queued_bytes_ = 0;

@@ -52,7 +52,8 @@ void ReplaySource::fill(const Recording& recording) {
     sample.velocities().resize(6 * sample.ids().size());
     sample.flags().resize(sample.ids().size());
     if (const auto gone = removed.find(step); gone != removed.end())
-      sample.gone().assign(gone->second.begin(), gone->second.end());
+      std::copy_if(gone->second.begin(), gone->second.end(), std::back_inserter(sample.gone()),
+                   [&](BodyId id) { return model_->has(id); });
     buffer_.add(sample);
   }
   at_ = static_cast<double>(first_);

@@ -27,7 +27,7 @@ class ReplaySource final : public Source {
   Step displayed() const override;
   view::Clocks clocks() const override;
   view::Worlds worlds() override { return {}; }
-  std::string ended() const override { return ""; }
+  std::optional<End> ended() const override { return std::nullopt; }
   std::uint64_t ask(const view::Do& wanted) override;
 
  private:

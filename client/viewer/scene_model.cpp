@@ -10,6 +10,9 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "packed arrays are written as they are in memory");
 
+constexpr std::uint32_t kNoMesh = 0xffffffff;
+constexpr std::uint32_t kUnknownColour = 0x808080ff;
+
 // A plane is shown as a square that reaches well beyond all bodies.
 TessellationOptions options_for(const Scene& scene) {
   Eigen::AlignedBox3d box;
@@ -25,6 +28,24 @@ std::string packed(const std::vector<T>& values) {
   std::string bytes(values.size() * sizeof(T), '\0');
   if (!values.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
   return bytes;
+}
+
+// Half of the box about the origin that holds it; 1 along an axis in which it is flat.
+Vec3 extents(const DisplayMesh& mesh) {
+  Vec3 size = Vec3::Zero();
+  for (std::size_t k = 0; k < mesh.positions.size(); ++k)
+    size[static_cast<int>(k % 3)] = std::max<double>(size[static_cast<int>(k % 3)], std::abs(mesh.positions[k]));
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(size[axis] > 0)) size[axis] = 1;
+  return size;
+}
+
+// Equal for meshes that are equal once they are stretched to extents of 1. Rounded, because sizes are.
+std::string shape_key(const DisplayMesh& mesh, const Vec3& size) {
+  std::vector<std::int16_t> rounded(mesh.positions.size());
+  for (std::size_t k = 0; k < rounded.size(); ++k)
+    rounded[k] = static_cast<std::int16_t>(std::lround(8192 * mesh.positions[k] / size[static_cast<int>(k % 3)]));
+  return packed(rounded) + packed(mesh.indices);
 }
 
 template <class List>
@@ -55,6 +76,7 @@ SceneModel::SceneModel(const Scene& scene, WorldId worlds) : meshes_(options_for
     for (int i = 0; i < 4; ++i) still.add_orientation(pose.orientation.coeffs()[i]);
     still.set_colour(what.colour);
   }
+  compare_meshes();
   if (box.isEmpty()) box.extend(Vec3::Zero());
   add_vector(*welcome_.mutable_low(), box.min());
   add_vector(*welcome_.mutable_high(), box.max());
@@ -71,7 +93,19 @@ SceneModel::Looks SceneModel::looks(const Scene& scene, const Body& body) {
   return {meshes_.index_of(scene, body), display_colour(body), body.inertial.mass};
 }
 
-void SceneModel::add(BodyId id, const Scene& shape) { bodies_.emplace(id, looks(shape, shape.bodies.front())); }
+void SceneModel::add(BodyId id, const Scene& shape) {
+  bodies_.emplace(id, looks(shape, shape.bodies.front()));
+  compare_meshes();
+}
+
+void SceneModel::compare_meshes() {
+  for (auto number = static_cast<std::uint32_t>(like_.size()); number < meshes(); ++number) {
+    const DisplayMesh& mesh = meshes_.meshes()[number];
+    const Vec3 size = extents(mesh);
+    const std::uint32_t first = of_shape_.try_emplace(shape_key(mesh, size), number).first->second;
+    like_.push_back({first, size.cwiseQuotient(extents(meshes_.meshes()[first]))});
+  }
+}
 
 void SceneModel::fill(view::Welcome& welcome) const {
   welcome.MergeFrom(welcome_);
@@ -80,9 +114,14 @@ void SceneModel::fill(view::Welcome& welcome) const {
 
 void SceneModel::add_mesh(std::uint32_t number, view::Mesh& mesh) const {
   const DisplayMesh& from = meshes_.meshes().at(number);
-  mesh.set_positions(packed(from.positions));
-  mesh.set_normals(packed(from.normals));
-  mesh.set_indices(packed(from.indices));
+  if (const Likeness& like = like_.at(number); like.mesh != number) {
+    mesh.set_like(like.mesh);
+    add_vector(*mesh.mutable_stretch(), like.stretch);
+  } else {
+    mesh.set_positions(packed(from.positions));
+    mesh.set_normals(packed(from.normals));
+    mesh.set_indices(packed(from.indices));
+  }
   double radius = 0;
   for (std::size_t v = 0; v < from.vertices(); ++v)
     radius = std::max<double>(radius,
@@ -91,7 +130,8 @@ void SceneModel::add_mesh(std::uint32_t number, view::Mesh& mesh) const {
 }
 
 void SceneModel::list(BodyId id, view::BodyList& list) const {
-  const Looks& what = bodies_.at(id);
+  const auto known = bodies_.find(id);
+  const Looks what = known != bodies_.end() ? known->second : Looks{kNoMesh, kUnknownColour, 0};
   list.add_id(id);
   list.add_mesh(what.mesh);
   list.add_colour(what.colour);

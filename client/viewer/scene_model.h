@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -23,7 +24,7 @@ class SceneModel {
   void fill(view::Welcome& welcome) const;  // scene, dt, gravity, box, grid, statics, the meshes so far
   std::uint32_t meshes() const { return static_cast<std::uint32_t>(meshes_.meshes().size()); }
   void add_mesh(std::uint32_t number, view::Mesh& mesh) const;
-  // Adds the body, which must be known, to the list.
+  // Adds the body to the list; one that is not known has a mesh that there is not.
   void list(BodyId id, view::BodyList& list) const;
 
  private:
@@ -32,8 +33,16 @@ class SceneModel {
     double mass = 0;
   };
   Looks looks(const Scene& scene, const Body& body);
+  void compare_meshes();
 
   DisplayMeshTable meshes_;
+  // By mesh: one with triangles of its own, which it is like but for its size along the axes.
+  struct Likeness {
+    std::uint32_t mesh = 0;
+    Vec3 stretch = Vec3::Ones();
+  };
+  std::vector<Likeness> like_;
+  std::unordered_map<std::string, std::uint32_t> of_shape_;  // the first of each shape, whatever size
   std::unordered_map<BodyId, Looks> bodies_;
   view::Welcome welcome_;  // all but meshes
 };

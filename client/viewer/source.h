@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,12 @@
 #include "viewer.pb.h"
 
 namespace soda::viewer {
+
+// Why nothing more will come.
+struct End {
+  std::string reason;
+  bool failed = false;  // otherwise it has come to its end as it should
+};
 
 // What has happened since it was asked last.
 struct News {
@@ -38,9 +45,8 @@ class Source {
   virtual const buffer::TransformBuffer* buffer() const = 0;
   virtual Step displayed() const = 0;
   virtual view::Clocks clocks() const = 0;
-  virtual view::Worlds worlds() = 0;  // rates are those since the last call
-  // Why nothing more will come, or "".
-  virtual std::string ended() const = 0;
+  virtual view::Worlds worlds() = 0;             // rates are those since the last call
+  virtual std::optional<End> ended() const = 0;  // nothing while more may come
 
   // Asks for something; the answer comes with poll(). Returns its tag.
   virtual std::uint64_t ask(const view::Do& wanted) = 0;

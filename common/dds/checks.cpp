@@ -143,7 +143,7 @@ std::string problem(const wire::Join& s) {
 std::string problem(const wire::Admission& s) { return ok_text(s.reason()) ? "" : "overlong text"; }
 
 std::string problem(const wire::Control& s) {
-  if (s.phase() > wire::PHASE_FAILED) return "unknown phase";
+  if (s.phase() > wire::PHASE_STOPPED) return "unknown phase";
   if (!ok_step(s.displayed()) || s.limit() < 0 || s.closed() < 0) return "impossible step";
   return ok_seconds(s.pace()) ? "" : "impossible pace";
 }

@@ -16,6 +16,14 @@ Flow newest(int instances) {
   return flow;
 }
 
+// The newest so many, in order; a write does not wait for readers that acknowledge nothing.
+Flow last(int samples) {
+  Flow flow;
+  flow.keep_last = samples;
+  flow.max_samples = samples;
+  return flow;
+}
+
 // Every sample, in order; a write waits when the history is full of samples that were not acknowledged.
 Flow all(int max_samples, Millis write_at_most) {
   Flow flow;
@@ -37,13 +45,15 @@ Topic admission_topic() { return {"soda/admission", newest(kManyWorlds)}; }
 
 Topic control_topic() { return {"soda/control", newest(1)}; }
 
-// A client's requests wait for a world 0 that is not there yet.
-Topic request_topic() { return {"soda/request", all(1024, Millis(1000))}; }
+// A client's requests wait for a world 0 that is not there yet; what cannot be written at once is kept by the client,
+// which may be a viewer with one thread for all.
+Topic request_topic() { return {"soda/request", all(1024, Millis(5))}; }
 
-Topic answer_topic() { return {"soda/answer", all(1024, Millis(100))}; }
+// Nobody waits for a client that does not listen: who lacks an answer asks again.
+Topic answer_topic() { return {"soda/answer", last(1024)}; }
 
 // The newest; who lacks older ones says so in its Status, and is told again.
-Topic action_log_topic() { return {"soda/action_log", all(4096, Millis(1000))}; }
+Topic action_log_topic() { return {"soda/action_log", last(4096)}; }
 
 Topic status_topic() { return {"soda/status", newest(kManyWorlds)}; }
 
@@ -63,7 +73,7 @@ Topic transforms_topic() {
   return topic;
 }
 
-Topic lack_topic() { return {"soda/lack", all(256, Millis(100))}; }
+Topic lack_topic() { return {"soda/lack", last(256)}; }
 
 // The core keeps what was not acknowledged by the neighbour's core and sends it again when asked, so that this history
 // only has to hold what is under way. A write must not hold up the loop, which then treats the connection as

@@ -142,6 +142,21 @@ void RecordingWriter::close(bool complete) {
   if (!file_) throw RecordingError(path_.string() + ": cannot be written");
 }
 
+void check_poses(const pb::RecordedPoses& poses, const std::string& file) {
+  constexpr double kUnit = 1e-3;  // that the squared length may be off; rounding to float makes 1e-7
+  const std::string at = file + ": poses at step " + std::to_string(poses.step());
+  if (poses.values_size() != 7 * poses.ids_size()) throw RecordingError(at + ": not seven numbers for each body");
+  for (int i = 0; i < poses.ids_size(); ++i) {
+    const float* const values = poses.values().data() + std::ptrdiff_t{7} * i;
+    const std::string who = ": body " + std::to_string(poses.ids(i));
+    if (!std::all_of(values, values + 7, [](float v) { return std::isfinite(v); }))
+      throw RecordingError(at + who + ": not finite");
+    double squared = 0;
+    for (int k = 3; k < 7; ++k) squared += static_cast<double>(values[k]) * values[k];
+    if (!(std::abs(squared - 1) < kUnit)) throw RecordingError(at + who + ": its orientation is not a unit quaternion");
+  }
+}
+
 Recording load_recording(const std::filesystem::path& path, bool with_poses) {
   const std::string name = path.string();
   std::ifstream file(path, std::ios::binary);
@@ -180,6 +195,15 @@ Recording load_recording(const std::filesystem::path& path, bool with_poses) {
   if (!has_scene || recording.digests.empty())
     throw RecordingError(name + ": is cut off before its first step" +
                          (recording.cut.empty() ? "" : " (" + recording.cut + ")"));
+  for (std::size_t i = 0; i < recording.poses.size(); ++i) {
+    const Step step = recording.poses[i].step();
+    if (step < 0 || (i > 0 && step <= recording.poses[i - 1].step()))
+      throw RecordingError(name + ": poses are not in order");
+    check_poses(recording.poses[i], name);
+  }
+  std::erase_if(recording.poses, [&](const pb::RecordedPoses& poses) {
+    return poses.step() >= static_cast<Step>(recording.digests.size());
+  });
   if (scene_hash(recording.encoded_scene) != header.scene_hash)
     throw RecordingError(name + ": its scene is not the one that its header names");
   if (!recording.complete && recording.cut.empty()) recording.cut = "the run did not come to its end";

@@ -63,11 +63,14 @@ struct Recording {
   std::string encoded_scene;
   Scene scene;
   std::vector<LoggedAction> actions;
-  std::vector<StepDigest> digests;  // of steps 0, 1, ...
-  std::vector<pb::RecordedPoses> poses;
-  bool complete = false;  // the run came to its end
-  std::string cut;        // why the file is not whole, or ""
+  std::vector<StepDigest> digests;       // of steps 0, 1, ...
+  std::vector<pb::RecordedPoses> poses;  // good, in order, none after the last digest
+  bool complete = false;                 // the run came to its end
+  std::string cut;                       // why the file is not whole, or ""
 };
+
+// Throws RecordingError, which names `file`, unless each body has a place and a unit quaternion.
+void check_poses(const pb::RecordedPoses& poses, const std::string& file);
 
 // Throws RecordingError for what is not a recording, of another version, or so short that there is no step in it.
 // Damage further on is told in `cut`; everything before it is good.

@@ -19,6 +19,7 @@ using border::Progress;
 
 constexpr auto kStatusEvery = 200ms;
 constexpr auto kStatusAtMost = 5ms;  // while a paced session waits for news of progress
+constexpr auto kIdleBehind = 4ms;    // where viewers are still to be told something
 constexpr auto kIdle = 20ms;         // longest sleep: reports and signals are looked after in between
 // A neighbour that is waited for and silent for that long is asked again what it has; then half as often each time,
 // because it may just be at a long step, and would be sent the same things again and again.
@@ -245,10 +246,10 @@ void Daemon::report_if_due(Clock::time_point now) {
   if (progress || now - status_at_ >= kStatusEvery) report_status(state_, now);
 }
 
-void Daemon::idle(Progress progress) {
+void Daemon::idle(Progress progress, std::chrono::milliseconds at_most) {
   const auto before = Clock::now();
   if (progress == Progress::kWaiting && limit_known_ >= 0) ask_the_silent(before);
-  transport_.wait(kIdle);
+  transport_.wait(at_most);
   const auto passed = Clock::now() - before;
   if (state_ != wire::STATE_RUNNING) return;
   if (progress == Progress::kWaiting) waiting_ += passed;
@@ -282,7 +283,7 @@ Daemon::End Daemon::run() {
     const auto now = Clock::now();
     working_ += now - before;
     report_if_due(now);
-    feed_.report(*core_, progress != Progress::kWorked, now);
+    const bool told = feed_.report(*core_, progress != Progress::kWorked, now);
     if (state_ == wire::STATE_PREPARING && transport_.connected() && reports_.listened_to())
       report_status(wire::STATE_READY, now);
     if (progress == Progress::kDone) {
@@ -292,7 +293,7 @@ Daemon::End Daemon::run() {
       }
       if (state_ == wire::STATE_DONE && released_.load()) break;
     }
-    if (progress != Progress::kWorked) idle(progress);
+    if (progress != Progress::kWorked) idle(progress, told ? kIdle : kIdleBehind);
   }
   if (stopped_.load()) return End::kStopped;
   transport_.flush(kFlushAtMost);

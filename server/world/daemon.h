@@ -72,7 +72,7 @@ class Daemon {
   void ask_the_silent(Clock::time_point now);
   void report_if_due(Clock::time_point now);
   void report_status(std::uint8_t state, Clock::time_point now);
-  void idle(border::Progress progress);
+  void idle(border::Progress progress, std::chrono::milliseconds at_most);
   void act_all();
   wire::Status status() const;
   Line& line(WorldId neighbour);

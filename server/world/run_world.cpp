@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <memory>
 #include <random>
 #include <stdexcept>
@@ -112,6 +113,10 @@ DaemonSettings settings_of(const wire::Session& session, const Options& options)
 void obey(Daemon& daemon, const wire::Control& control) {
   if (control.phase() == wire::PHASE_FAILED) {
     spdlog::error("the session has failed; leaving it");
+    return daemon.stop();
+  }
+  if (control.phase() == wire::PHASE_STOPPED) {
+    spdlog::info("the session was stopped; leaving it");
     return daemon.stop();
   }
   if (control.phase() != wire::PHASE_GATHERING) {
@@ -229,7 +234,13 @@ int run_host(const Options& options, StopSignals& signals) {
   }
   end_watch();
   look_for_conflict(host);
-  if (code == kExitDone) host.finish(kHostFinish);
+  if (code == kExitDone) {
+    host.finish(kHostFinish);
+  } else {
+    // `soda run` stops its worlds with SIGTERM where one of them has failed, or it has itself.
+    const bool failed = options.supervised_by != 0 && signals.received() == SIGTERM;
+    host.leave(failed ? wire::PHASE_FAILED : wire::PHASE_STOPPED);
+  }
   return code;
 }
 

@@ -12,6 +12,8 @@
 namespace soda::world {
 namespace {
 
+constexpr std::chrono::milliseconds kLeaveAtMost{1000};
+
 void hand_out(dds::Writer<wire::SceneChunk>& writer, std::uint64_t instance, const std::string& scene) {
   const std::size_t count = (scene.size() + dds::kMaxChunkBytes - 1) / dds::kMaxChunkBytes;
   for (std::size_t i = 0; i < count; ++i) {
@@ -108,6 +110,11 @@ void SessionHost::heard(const wire::Join& claim) {
 std::string SessionHost::conflict() const {
   const std::lock_guard lock(mutex_);
   return conflict_;
+}
+
+void SessionHost::leave(std::uint8_t phase) {
+  service_->leave(phase);
+  finish(kLeaveAtMost);
 }
 
 void SessionHost::finish(std::chrono::milliseconds at_most) { control_writer_.wait_acknowledged(at_most); }

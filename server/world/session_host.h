@@ -24,6 +24,8 @@ class SessionHost {
   std::string conflict() const;
   // Blocks until all members have the last Control, or the time is up.
   void finish(std::chrono::milliseconds at_most);
+  // Tells all that the session is over before its end, as wire::PHASE_STOPPED or PHASE_FAILED.
+  void leave(std::uint8_t phase);
 
  private:
   void heard(const wire::Session& other, const dds::WriterKey& writer);

@@ -41,14 +41,24 @@ SessionService::SessionService(const wire::Session& session, std::shared_ptr<con
   thread_ = std::thread([this] { run(); });
 }
 
-SessionService::~SessionService() {
+SessionService::~SessionService() { quit(); }
+
+void SessionService::quit() {
   {
     const std::lock_guard lock(mutex_);
     quit_ = true;
     news_ = true;
   }
   changed_.notify_one();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
+}
+
+void SessionService::leave(std::uint8_t phase) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!over()) phase_ = phase;
+  }
+  quit();
 }
 
 std::string SessionService::join(const wire::Join& claim) {
@@ -120,8 +130,7 @@ void SessionService::request(const wire::Request& request) {
 }
 
 wire::Answer SessionService::answer_to(const wire::Request& request, std::optional<WantedAction> wanted) {
-  if (phase_ == wire::PHASE_ENDED || phase_ == wire::PHASE_FAILED)
-    return desk_.answer(request, "the session has ended", displayed_);
+  if (over()) return desk_.answer(request, "the session has ended", displayed_);
   switch (request.kind()) {
     case wire::REQUEST_ACTION:
       if (closed_ >= session_.last_step())
@@ -263,6 +272,7 @@ void SessionService::run() {
     const bool ticking = phase_ == wire::PHASE_RUNNING && pacer_.rate() > 0 && !pacer_.paused();
     changed_.wait_for(lock, ticking ? kTick : std::chrono::milliseconds(500), [this] { return news_; });
   }
+  if (over() && last.phase() != phase_) outlet_.control(next(seconds_now()));
 }
 
 }  // namespace soda::world

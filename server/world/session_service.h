@@ -33,6 +33,8 @@ class SessionService {
   SessionService(const wire::Session& session, std::shared_ptr<const Scene> scene, std::vector<WantedAction> actions,
                  Outlet outlet);
   ~SessionService();
+  // The session is over before its end, as `phase` says. Tells that, last of all.
+  void leave(std::uint8_t phase);
   SessionService(const SessionService&) = delete;
   SessionService& operator=(const SessionService&) = delete;
 
@@ -47,6 +49,8 @@ class SessionService {
   bool gathering() const;  // the run has not started
 
  private:
+  void quit();
+  bool over() const { return phase_ >= wire::PHASE_ENDED; }
   struct Seat {
     std::uint64_t nonce = 0;  // of the daemon that holds it; 0: free
     std::string holder;       // "host, process pid", for messages

@@ -9,7 +9,12 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kEvery = 4ms;
-constexpr auto kWholeEvery = 250ms;  // whoever loses samples because there are too many must not make for more
+// Whoever loses samples because there are too many must not make for more, nor take a world's time.
+constexpr auto kWholeEvery = 250ms;
+constexpr int kWholeShare = 10;  // of the time at most one part in so many
+// Steps told at once, or the fourth part of what there is to tell: what a reader misses has to be kept until it has
+// asked (topics.cpp: 32 samples).
+constexpr Step kAtOnce = 8;
 
 std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
@@ -30,37 +35,47 @@ void ViewFeed::finalised(Step step, const border::Produced& produced) {
   finals_.push_back(produced.states());
 }
 
-void ViewFeed::report(const border::WorldCore& core, bool rest, Clock::time_point now) {
-  if (!rest && now - reported_ < kEvery) return;
+bool ViewFeed::report(const border::WorldCore& core, bool rest, Clock::time_point now) {
+  if ((!rest || behind_) && now - reported_ < kEvery) return !behind_;
   reported_ = now;
   watched_ = reports_.wants_transforms();
   if (!watched_) {
     told_.clear();
     finals_.clear();
-    return;
+    behind_ = false;
+    return true;
   }
-  if (core.clock() < 0) return;
+  if (core.clock() < 0) return true;
   anew_ = reports_.take_lack() || anew_;
-  if (anew_ && now - whole_ >= kWholeEvery) {
+  if (anew_ && !behind_ && now >= next_whole_) {
     anew_ = false;
     told_.clear();
   }
-  if (told_.empty()) {
-    whole_ = now;
-    finals_.clear();
+  const auto began = Clock::now();
+  const bool whole = told_.empty();
+  if (whole) finals_.clear();
+  behind_ = !tell_all(core);
+  catching_up_ = catching_up_ || whole;
+  if (catching_up_) {
+    const auto spent = Clock::now() - began;
+    spent_ = whole ? spent : spent_ + spent;
+    next_whole_ = now + spent + std::max<Clock::duration>(kWholeEvery, kWholeShare * spent_);
+    catching_up_ = behind_;
   }
-  tell_all(core);
+  return !behind_;
 }
 
-void ViewFeed::tell_all(const border::WorldCore& core) {
+bool ViewFeed::tell_all(const border::WorldCore& core) {
   const Step front = core.front();
+  const Step left = std::max<Step>(1, front - first_told_ - static_cast<Step>(told_.size()) + 1);
+  Step budget = std::max(kAtOnce, left / 4);
   const auto states = [&](Step step) -> const States& {
     return step < core.oldest() ? finals_.at(static_cast<std::size_t>(step - first_final_)) : core.states(step);
   };
   if (told_.empty()) {
     first_told_ = core.oldest();
     told_.push_back(core.states(first_told_));
-    tell(wire::VIEW_WHOLE, first_told_, States(), told_.back(), core);
+    tell(wire::VIEW_WHOLE, first_told_, States(), told_.back(), first_told_, core);
   }
   // What is told of first_told_ is final.
   for (Step step = first_told_ + 1; step <= front; ++step) {
@@ -68,10 +83,12 @@ void ViewFeed::tell_all(const border::WorldCore& core) {
     if (at < told_.size()) {
       if (told_[at].same_as(states(step))) continue;
       const States before = std::exchange(told_[at], states(step));
-      tell(wire::VIEW_AGAIN, step, before, told_[at], core);
-    } else {
+      tell(wire::VIEW_AGAIN, step, before, told_[at], step, core);
+    } else if (budget-- > 0) {
       told_.push_back(states(step));
-      tell(wire::VIEW_STEP, step, told_[at - 1], told_[at], core);
+      tell(wire::VIEW_STEP, step, told_[at - 1], told_[at], step, core);
+    } else {
+      break;
     }
   }
   // Nothing changes in a final step; the newest is what the next one is compared with.
@@ -83,18 +100,20 @@ void ViewFeed::tell_all(const border::WorldCore& core) {
     finals_.pop_front();
     ++first_final_;
   }
-  // A repair under way, or news of finality, are news, too.
-  if (front != front_told_ || core.final_step() != final_told_)
-    tell(wire::VIEW_AGAIN, first_told_, told_.front(), told_.front(), core);
+  const Step whole = std::min(front, first_told_ + static_cast<Step>(told_.size()) - 1);
+  // The end of a repair, one under way, or news of finality, are news, too.
+  if (whole != front_told_ || core.final_step() != final_told_)
+    tell(wire::VIEW_AGAIN, first_told_, told_.front(), told_.front(), whole, core);
+  return whole == front;
 }
 
-void ViewFeed::tell(std::uint8_t kind, Step step, const States& before, const States& now,
+void ViewFeed::tell(std::uint8_t kind, Step step, const States& before, const States& now, Step front,
                     const border::WorldCore& core) {
   sample_.number(++number_);
   sample_.kind(kind);
   sample_.step(step);
   sample_.time(static_cast<double>(step) * dt_);
-  sample_.front(front_told_ = core.front());
+  sample_.front(front_told_ = front);
   sample_.final_step(final_told_ = core.final_step());
   sample_.computed(now_ns());
   sample_.ids().clear();

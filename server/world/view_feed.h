@@ -22,11 +22,14 @@ class ViewFeed {
   // A step has become final: it may be released before anybody asks again.
   void finalised(Step step, const border::Produced& produced);
   // Tells what is new, if anybody watches. At most some hundred times a second, unless the world is about to `rest`.
-  void report(const border::WorldCore& core, bool rest, Clock::time_point now);
+  // False: there is more to tell soon.
+  bool report(const border::WorldCore& core, bool rest, Clock::time_point now);
 
  private:
-  void tell_all(const border::WorldCore& core);
-  void tell(std::uint8_t kind, Step step, const States& before, const States& now, const border::WorldCore& core);
+  bool tell_all(const border::WorldCore& core);
+  // `front`: steps up to there are whole when this sample has been taken.
+  void tell(std::uint8_t kind, Step step, const States& before, const States& now, Step front,
+            const border::WorldCore& core);
 
   const std::uint64_t instance_;
   const WorldId me_;
@@ -34,7 +37,10 @@ class ViewFeed {
   Reports& reports_;
   bool anew_ = false;
   bool watched_ = false;
-  Clock::time_point reported_{}, whole_{};
+  bool behind_ = false;       // there is more to tell than is told at once
+  bool catching_up_ = false;  // since a VIEW_WHOLE
+  Clock::duration spent_{};   // on that
+  Clock::time_point reported_{}, next_whole_{};
   std::uint64_t number_ = 0;
   std::deque<States> told_;  // of steps first_told_, ...
   Step first_told_ = 0;

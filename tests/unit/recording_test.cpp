@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <limits>
 
 #include "common/scene/scene_file.h"
 #include "common/scene_hash.h"
@@ -33,7 +34,7 @@ class RecordingFile : public testing::Test {
         pb::RecordedPoses poses;
         poses.set_step(step);
         poses.add_ids(static_cast<std::uint64_t>(step) + 1);
-        for (int i = 0; i < 7; ++i) poses.add_values(static_cast<float>(i));
+        for (int i = 0; i < 7; ++i) poses.add_values(i == 6 ? 1 : i < 3 ? static_cast<float>(i) : 0);
         writer.add_poses(std::move(poses));
       }
       writer.flush_if_due();
@@ -96,6 +97,40 @@ TEST_F(RecordingFile, DamageIsNoticed) {
     } catch (const RecordingError&) {
     }
   }
+}
+
+// A file with a good hash may still say nonsense.
+TEST_F(RecordingFile, PosesAreChecked) {
+  const auto refusal = [&](Step step, int values, float w) -> std::string {
+    const std::string other = (folder.path / "c.rec").string();
+    const std::string encoded = encode_scene(scene);
+    RecordingWriter writer(other);
+    writer.begin(scene_hash(encoded), encoded, {});
+    for (Step t = 0; t <= 4; ++t) writer.add_digest(t, {1, 1});
+    for (const Step at : {Step{2}, step}) {
+      pb::RecordedPoses poses;
+      poses.set_step(at);
+      poses.add_ids(1);
+      for (int i = 0; i < (at == 2 ? 7 : values); ++i) poses.add_values(i == 6 ? (at == 2 ? 1 : w) : 0);
+      writer.add_poses(std::move(poses));
+    }
+    writer.close(true);
+    try {
+      const Recording back = load_recording(other, true);
+      return std::to_string(back.poses.size()) + " poses";
+    } catch (const RecordingError& e) {
+      return e.what();
+    }
+  };
+  const auto expect = [](const std::string& said, const std::string& text) {
+    EXPECT_NE(said.find(text), std::string::npos) << said;
+  };
+  EXPECT_EQ(refusal(3, 7, 1), "2 poses");
+  EXPECT_EQ(refusal(Step{1} << 50, 7, 1), "1 poses") << "after the last digest nothing is known";
+  expect(refusal(1, 7, 1), "not in order");
+  expect(refusal(3, 6, 1), "c.rec: poses at step 3: not seven numbers");
+  expect(refusal(3, 7, 2), "body 1: its orientation is not a unit quaternion");
+  expect(refusal(3, 7, std::numeric_limits<float>::quiet_NaN()), "not finite");
 }
 
 TEST_F(RecordingFile, OtherVersionsAndOtherFilesAreRefused) {

@@ -43,6 +43,8 @@ let framesTaken: number | null = null; // number of the newest frame that was no
 
 const session: Session = new Session({
   welcome(welcome) {
+    connection.expectMore(true); // a session may follow one that has ended
+    banner.update();
     picture.begin(welcome, link.camera !== null);
     if (link.camera) picture.views.restore(link.camera);
     link.camera = null;
@@ -74,7 +76,7 @@ const session: Session = new Session({
   },
   rollback: (record) => ticker.rolledBack(record, record.at),
   ended() {
-    connection.finish();
+    connection.expectMore(false);
     toolbar.update();
     banner.update();
     timeline.update();

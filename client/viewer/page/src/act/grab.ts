@@ -3,7 +3,7 @@
 import { create } from '@bufbuild/protobuf';
 import { Plane, Quaternion, Vector3, type Ray } from 'three';
 import { GrabSchema, MoveGrabSchema, ReleaseSchema } from '../gen/action_pb';
-import { notConnected, type Requests } from '../net/requests';
+import { noAnswer, notConnected, type Requests } from '../net/requests';
 import { vec3 } from './spawning';
 
 const movesPerSecond = 30;
@@ -93,7 +93,7 @@ export class Grabbing {
     void this.requests
       .act({ case: 'release', value: create(ReleaseSchema, { grab: this.logged! }) }, triesLeft < 30)
       .then((answer) => {
-        if (!answer.accepted && answer.reason === notConnected && triesLeft > 0)
+        if (!answer.accepted && [notConnected, noAnswer].includes(answer.reason) && triesLeft > 0)
           setTimeout(() => this.sendRelease(triesLeft - 1), 1000);
       });
   }

@@ -28,6 +28,12 @@ export class Shapes {
   private known = new Map<string, number>();
 
   add(mesh: Mesh): void {
+    const like = mesh.like === undefined ? undefined : this.forms[mesh.like];
+    if (like) {
+      const size = like.size.map((s, c) => s * (mesh.stretch[c] ?? 1)) as [number, number, number];
+      this.forms.push({ shape: like.shape, size, radius: mesh.radius });
+      return;
+    }
     const positions = new Float32Array(copied(mesh.positions));
     const normals = new Float32Array(copied(mesh.normals));
     const indices = new Uint32Array(copied(mesh.indices));

@@ -3,7 +3,7 @@ import { newTicks, type Ticks } from './ticks';
 import type { BodyList, Clocks, Ended, Frame, Rollback, ToPage, Welcome, WorldState } from '../gen/viewer_pb';
 
 // Gateway and page are of one build; a page that a browser kept from another one says so instead of misreading.
-export const protocol = 1;
+export const protocol = 2;
 
 export interface RollbackRecord {
   world: number;
@@ -63,9 +63,9 @@ export class Session {
     return !!this.welcome?.mayAct && !this.welcome.replay && !this.ended;
   }
 
-  // Pausing and speed; of a replay they are the page's own.
+  // Pausing and speed.
   get mayPace(): boolean {
-    return !!this.welcome && (this.welcome.replay || this.welcome.mayAct) && !this.ended;
+    return !!this.welcome?.mayAct && !this.ended;
   }
 
   take(message: ToPage, now: number): void {

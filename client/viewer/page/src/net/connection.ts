@@ -65,10 +65,10 @@ export class Connection {
     };
   }
 
-  // Nothing more is to come: do not try again.
-  finish(): void {
-    this.stopped = true;
-    clearTimeout(this.timer);
+  // Whether more is to come. Otherwise, if the connection breaks, it is not tried again.
+  expectMore(more: boolean): void {
+    this.stopped = !more;
+    if (!more) clearTimeout(this.timer);
   }
 
   // Whether it could be sent.

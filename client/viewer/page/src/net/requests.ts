@@ -25,6 +25,7 @@ interface Pending {
 
 const keep = 200;
 export const notConnected = 'there is no connection';
+export const noAnswer = 'the session does not answer'; // client/buffer says so
 
 export class Requests {
   readonly answers: AnswerRecord[] = [];

@@ -84,6 +84,14 @@ export class Banner {
         text: `Waiting for worlds: ${there} of ${session.welcome.worlds} are there, ${ready} ready.`,
       };
     }
+    // Worlds that were killed, or that nothing comes from through the network, cannot say so.
+    if (session.rows.length > 0 && session.rows.every((row) => row.silent))
+      return {
+        kind: 'bad',
+        title: 'Nothing is heard of the session',
+        text: 'All its worlds are silent: they were ended, or the network is broken. What you see is the last that was heard.',
+        button: { text: 'Look around', does: 'dismiss' },
+      };
     return null;
   }
 }

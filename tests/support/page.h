@@ -49,6 +49,7 @@ class Page {
   std::vector<view::Rollback> rollbacks;
   std::vector<std::string> events;
   std::string ended;
+  bool failed = false;
 
  private:
   struct Impl;
@@ -60,7 +61,7 @@ class Page {
   std::uint32_t number_ = 0;
 };
 
-// The answer to a GET: status, and body.
-std::pair<int, std::string> get(std::uint16_t port, const std::string& target);
+// The answer to a GET: status, and body. `host`: what a browser would call the server.
+std::pair<int, std::string> get(std::uint16_t port, const std::string& target, const std::string& host = "127.0.0.1");
 
 }  // namespace soda::test

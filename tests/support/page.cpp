@@ -1,4 +1,4 @@
-#include "tests/distributed/page.h"
+#include "tests/support/page.h"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -92,6 +92,9 @@ void Page::take(const view::ToPage& message) {
     case view::ToPage::kWelcome:
       welcome = message.welcome();
       welcomed = true;
+      ended.clear();
+      ids.clear();
+      bodies.clear();
       break;
     case view::ToPage::kBodies:
       ids.resize(message.bodies().first());
@@ -115,6 +118,7 @@ void Page::take(const view::ToPage& message) {
       break;
     case view::ToPage::kEnded:
       ended = message.ended().reason();
+      failed = message.ended().failed();
       break;
     case view::ToPage::kEvents:
       events.insert(events.end(), message.events().text().begin(), message.events().text().end());
@@ -153,12 +157,12 @@ void Page::take(const view::Frame& told) {
   send(shown);
 }
 
-std::pair<int, std::string> get(std::uint16_t port, const std::string& target) {
+std::pair<int, std::string> get(std::uint16_t port, const std::string& target, const std::string& host) {
   asio::io_context io;
   beast::tcp_stream stream(io);
   stream.connect(tcp::endpoint(asio::ip::make_address("127.0.0.1"), port));
   http::request<http::empty_body> request(http::verb::get, target, 11);
-  request.set(http::field::host, "127.0.0.1");
+  request.set(http::field::host, host);
   http::write(stream, request);
   beast::flat_buffer buffer;
   http::response<http::string_body> response;
