@@ -2,13 +2,16 @@
 PRESET ?= release
 RUN_WORLDS ?= 4
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build run test test-all test-asan test-tsan format
+.PHONY: help setup setup-test configure build run test test-all test-asan test-tsan format
 
 help:            ## list the targets
 	@grep -hE '^[a-z-]+: .*##' $(MAKEFILE_LIST) | sed 's/: .*##/\t/' | expand -t 12
 
 setup:           ## install the Debian packages that are missing (says which)
 	@scripts/setup.sh
+
+setup-test:
+	@scripts/setup.sh test
 
 configure: setup ## configure build/$(PRESET)
 	@cmake --preset $(PRESET) --log-level=WARNING
@@ -19,10 +22,10 @@ build: configure ## build into build/$(PRESET), programs in build/$(PRESET)/bin
 run: build       ## the demo: a small city on 4 world daemons
 	@scripts/demo.sh build/$(PRESET)/bin $(RUN_WORLDS)
 
-test: build      ## unit, simulation and distributed tests, and the sanitizers' sample (what CI runs)
+test: setup-test build ## unit, simulation and distributed tests, and the sanitizers' sample (what CI runs)
 	@scripts/test.sh sample
 
-test-all: build  ## every test, whole matrices
+test-all: setup-test build ## every test, whole matrices
 	@scripts/test.sh all
 
 format:          ## clang-format over our sources

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that SODA is built from and that are missing here, and says which.
 # Does nothing when all are there. Needs root or sudo only when something is missing.
+#   setup.sh        what building and running need
+#   setup.sh test   also what only tests need: a browser
 set -euo pipefail
 
 packages=(
@@ -21,6 +23,10 @@ packages=(
 node_major=$(node --version 2>/dev/null | sed 's/^v\([0-9]*\).*/\1/') || node_major=0
 if [ "${node_major:-0}" -lt 18 ] || ! command -v npm >/dev/null; then
   packages+=(nodejs npm)
+fi
+
+if [ "${1:-}" = test ]; then
+  packages+=(chromium fonts-dejavu-core)                    # the page's tests; text on its screenshots
 fi
 
 missing=()

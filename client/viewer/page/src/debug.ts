@@ -12,6 +12,7 @@ export interface SodaDebug {
   displayed(): number; // that the session shows to those who are live
   anticipated(): boolean; // the picture may still change
   fps(): number;
+  delayMilliseconds(): number; // from computing to showing, of the newest step that is shown
   frameMilliseconds(): number; // JavaScript per picture, mean of the last second
   bodyPosition(id: Id): [number, number, number] | null;
   screenPosition(id: Id): [number, number] | null; // CSS pixels on the page
@@ -44,6 +45,7 @@ export function expose(picture: Picture, session: Session, requests: Requests, r
     displayed: () => session.displayed,
     anticipated: () => picture.playback?.anticipated ?? false,
     fps: () => rates.fps,
+    delayMilliseconds: () => 1000 * (picture.playback?.delay ?? 0),
     frameMilliseconds: () => rates.milliseconds,
     bodyPosition: (id) => {
       const body = find(id);

@@ -32,6 +32,7 @@ export async function openPage(
 ): Promise<Page> {
   const context = await browser.newContext({ viewport: { width, height }, colorScheme: dark ? 'dark' : 'light' });
   const page = await context.newPage();
+  page.setDefaultTimeout(60_000);
   if (pause > 0)
     await page.addInitScript((ms) => {
       const native = window.requestAnimationFrame.bind(window);
@@ -42,6 +43,14 @@ export async function openPage(
   });
   page.on('pageerror', (error) => problems.push(`exception: ${error.message}\n${error.stack}`));
   await page.goto(url);
-  await page.waitForFunction(() => window.soda?.bodiesDrawn() > 0, null, { timeout: 240_000 });
+  // Asked at times, not with each picture: a page that draws none should be able to say so.
+  await page.waitForFunction(() => window.soda?.bodiesDrawn() > 0, null, { timeout: 240_000, polling: 200 }).catch(async (error: Error) => {
+    const asked = page.evaluate(() => ({
+      page: document.visibilityState, banner: document.querySelector('#banner:not([hidden])')?.textContent, fps: window.soda?.fps(),
+      connected: window.soda?.connected(), worlds: window.soda?.worlds().length, drawn: window.soda?.bodiesDrawn(),
+    }));
+    const state = await Promise.race([asked, new Promise((resolve) => setTimeout(resolve, 20_000, 'it does not answer'))]);
+    throw new Error(`nothing is drawn: ${JSON.stringify(state)}; ${problems.join('\n')}`, { cause: error });
+  });
   return page;
 }

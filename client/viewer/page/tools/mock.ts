@@ -151,7 +151,7 @@ function bodyList(first: number, meshes: Mesh[] = []): BodyList {
   });
 }
 
-const dist = join(dirname(fileURLToPath(import.meta.url)), '../dist');
+const dist = process.env.SODA_PAGE_OUT ?? join(dirname(fileURLToPath(import.meta.url)), '../dist');
 const types: Record<string, string> = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css' };
 // Stricter than the gateway's, so that the page stays within it.
 const policy = "default-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws: wss:";

@@ -20,7 +20,7 @@ export interface PlaybackEvents {
 export class Playback {
   head = 0; // steps, where the picture is
   anticipated = false; // of the frame that the picture is moving to
-  age = 0;
+  delay = 0; // s, from when a world had computed what was reached last until it was shown
   private queue: Snapshot[] = [];
   private active: Uint32Array = new Uint32Array(0); // bodies on their way from frame a to frame b
   private a = 0;
@@ -30,6 +30,8 @@ export class Playback {
   private jumpUntil = 0;
   private jumped = new Uint8Array(0);
   private last = 0; // s, the picture before
+  private age = 0; // s, of frame b when it was sent
+  private at = 0; // s, when it came
   private newest = 0;
   readonly pacer: Pacer;
 
@@ -79,6 +81,7 @@ export class Playback {
     this.head += passed * Math.min(4 * speed, Math.max(0.2 * speed, speed + pull));
     if (this.head > this.newest) this.head = this.newest;
     while (this.head >= this.b || this.settled) {
+      if (!this.settled) this.delay = now - this.at + this.age;
       this.settle();
       const next = this.queue.shift();
       if (!next) break;
@@ -121,6 +124,7 @@ export class Playback {
     this.active = known;
     this.anticipated = frame.anticipated;
     this.age = frame.age;
+    this.at = frame.at;
     this.settled = false;
 
     const { toPos, toRot, fromPos, fromRot, pos, rot } = bodies;
