@@ -6,15 +6,17 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
-#include <map>
-#include <memory>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "bench/commands.h"
 #include "bench/program.h"
 #include "client/buffer/session_client.h"
+#include "common/scene/scene_builder.h"
 #include "common/scene/scene_file.h"
 #include "tests/support/page.h"
 
@@ -31,27 +33,20 @@ constexpr const char* kToken = "token-of-the-bench";
 
 // Boxes in layers, each of which flies its own way as one: nothing meets. One in `moving_every` moves at all.
 Scene flying_boxes(int bodies, int moving_every) {
-  Scene scene;
-  scene.name = "flying boxes";
-  scene.gravity = Vec3::Zero();
-  scene.geometries.emplace_back(Box{Vec3::Constant(0.5)});
+  SceneBuilder builder("flying boxes");
+  builder.scene.gravity = Vec3::Zero();
   int side = 1;
   while (side * side * 4 < bodies) ++side;
   for (int i = 0; i < bodies; ++i) {
-    Body body;
-    body.id = static_cast<BodyId>(i + 1);
     const int layer = i / (side * side), row = i / side % side, column = i % side;
-    body.pose.position = kSpacing * Vec3(column, row, layer);
-    body.shapes.push_back({0, Pose()});
+    Body& body = builder.add(Box{Vec3::Constant(0.5)}, kSpacing * Vec3(column, row, layer));
     body.colour = 0x3d7ea6ff;
-    if (i % moving_every == 0) {
-      const double turn = layer * 1.3;
-      body.linear_velocity = kSpeed * Vec3(std::cos(turn), std::sin(turn), 0);
-      body.angular_velocity = Vec3(0.1, 0.2, 0.3);
-    }
-    scene.bodies.push_back(std::move(body));
+    if (i % moving_every != 0) continue;
+    const double turn = layer * 1.3;
+    body.linear_velocity = kSpeed * Vec3(std::cos(turn), std::sin(turn), 0);
+    body.angular_velocity = Vec3(0.1, 0.2, 0.3);
   }
-  return scene;
+  return builder.finish();
 }
 
 // Sums over the worlds.
@@ -93,7 +88,8 @@ struct Measured {
   double steps_per_second = 0, world_ms_unwatched = 0, world_ms_watched = 0;  // CPU per step of all worlds
   double gateway_cpu = 0;                                                     // cores
   double bytes_per_second = 0, frames_per_second = 0;                         // to the page
-  double age_median = 0, age_p99 = 0;                                         // ms
+  double age_median = 0, age_p99 = 0;        // ms: since the displayed step was computed, which is some time ahead
+  double newest_median = 0, newest_p99 = 0;  // ms: the same of the newest step that there is, in the future
 };
 
 // How long its frames have been under way when the page has them: a page that is a thread of this process.
@@ -106,6 +102,25 @@ class Watcher {
     return page_.until([&] { return page_.bodies.size() == bodies; }, at_most);
   }
   void watch(std::chrono::milliseconds time, Measured& result) {
+    const std::vector<double> ages = watch_ages(time, result);
+    result.age_median = at(ages, 0.5);
+    result.age_p99 = at(ages, 0.99);
+  }
+  void watch_newest(std::chrono::milliseconds time, Measured& result) {
+    page_.look(100'000);
+    page_.until([] { return false; }, 1000ms);
+    Measured other;
+    const std::vector<double> ages = watch_ages(time, other);
+    page_.look(0);
+    result.newest_median = at(ages, 0.5);
+    result.newest_p99 = at(ages, 0.99);
+  }
+
+ private:
+  static double at(const std::vector<double>& sorted, double share) {
+    return sorted.empty() ? 0 : sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5)];
+  }
+  std::vector<double> watch_ages(std::chrono::milliseconds time, Measured& result) {
     const std::uint64_t bytes = page_.bytes, frames = page_.frames;
     std::vector<double> ages;
     std::uint64_t seen = frames;
@@ -120,13 +135,10 @@ class Watcher {
     const double seconds = std::chrono::duration<double>(Clock::now() - began).count();
     result.bytes_per_second = static_cast<double>(page_.bytes - bytes) / seconds;
     result.frames_per_second = static_cast<double>(page_.frames - frames) / seconds;
-    if (ages.empty()) return;
     std::sort(ages.begin(), ages.end());
-    result.age_median = ages[ages.size() / 2];
-    result.age_p99 = ages[ages.size() * 99 / 100];
+    return ages;
   }
 
- private:
   test::Page page_;
 };
 
@@ -185,18 +197,21 @@ void measure(const Options& options, int bodies, bool all, Csv& csv, Headline& h
       const double cpu = gateway.cpu_seconds();
       m.world_ms_watched = per_step([&] { watcher.watch(time, m); });
       m.gateway_cpu = (gateway.cpu_seconds() - cpu) / std::chrono::duration<double>(time).count();
+      watcher.watch_newest(time / 2, m);
     }
     browser = in_browser(host + std::to_string(port) + "/?token=" + kToken, options.quick ? 2 : 10);
   }
   std::filesystem::remove_all(folder);
   std::printf(
       "  %.1f steps/s; CPU per step of the worlds %.2f ms, watched %.2f ms; gateway %.2f cores, %.2f MB/s and %.0f "
-      "frames/s to the page, age %.1f ms (p99 %.1f)\n  browser: %.1f pictures/s, %.2f ms of script each, %.0f ms old\n",
+      "frames/s to the page; displayed %.0f ms after it was computed (p99 %.0f), the newest step %.1f ms (%.1f)\n  "
+      "browser: %.1f pictures/s, %.2f ms of script each, %.0f ms old\n",
       m.steps_per_second, m.world_ms_unwatched, m.world_ms_watched, m.gateway_cpu, 1e-6 * m.bytes_per_second,
-      m.frames_per_second, m.age_median, m.age_p99, browser.fps, browser.script_ms, browser.delay_ms);
+      m.frames_per_second, m.age_median, m.age_p99, m.newest_median, m.newest_p99, browser.fps, browser.script_ms,
+      browser.delay_ms);
   csv.row(bodies, all ? 1 : 0, m.steps_per_second, m.world_ms_unwatched, m.world_ms_watched, m.gateway_cpu,
-          m.bytes_per_second, m.frames_per_second, m.age_median, m.age_p99, browser.fps, browser.script_ms,
-          browser.delay_ms);
+          m.bytes_per_second, m.frames_per_second, m.age_median, m.age_p99, m.newest_median, m.newest_p99, browser.fps,
+          browser.script_ms, browser.delay_ms);
   headline.add(name + ".steps_per_second", m.steps_per_second);
   headline.add(name + ".world_ms_per_step_unwatched", m.world_ms_unwatched);
   headline.add(name + ".world_ms_per_step_watched", m.world_ms_watched);
@@ -205,6 +220,8 @@ void measure(const Options& options, int bodies, bool all, Csv& csv, Headline& h
   headline.add(name + ".frames_per_second", m.frames_per_second);
   headline.add(name + ".age_ms_median", m.age_median);
   headline.add(name + ".age_ms_p99", m.age_p99);
+  headline.add(name + ".newest_age_ms_median", m.newest_median);
+  headline.add(name + ".newest_age_ms_p99", m.newest_p99);
   headline.add(name + ".browser_fps", browser.fps);
   headline.add(name + ".browser_script_ms", browser.script_ms);
   headline.add(name + ".browser_delay_ms", browser.delay_ms);
@@ -215,7 +232,8 @@ void measure(const Options& options, int bodies, bool all, Csv& csv, Headline& h
 void viewer(const Options& options, Headline& headline) {
   Csv csv(options, "viewer",
           "bodies,all_move,steps_per_second,world_ms_unwatched,world_ms_watched,gateway_cores,page_bytes_per_second,"
-          "frames_per_second,age_ms_median,age_ms_p99,browser_fps,browser_script_ms,browser_delay_ms");
+          "frames_per_second,age_ms_median,age_ms_p99,newest_age_ms_median,newest_age_ms_p99,browser_fps,browser_"
+          "script_ms,browser_delay_ms");
   for (const int bodies : options.quick ? std::vector{1000} : std::vector{1000, 8000, 30000})
     for (const bool all : {false, true}) measure(options, bodies, all, csv, headline);
   csv.close();
