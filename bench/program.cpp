@@ -10,6 +10,7 @@
 #include <iterator>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 #include "bench/harness.h"
@@ -17,6 +18,7 @@
 namespace soda::bench {
 
 Program::Program(std::vector<std::string> arguments, std::string program) {
+  group_ = !program.empty();
   if (program.empty()) program = soda_program().string();
   arguments.insert(arguments.begin(), program);
   std::vector<char*> words;
@@ -27,6 +29,7 @@ Program::Program(std::vector<std::string> arguments, std::string program) {
   pid_ = fork();
   if (pid_ < 0) throw std::runtime_error("cannot start " + program);
   if (pid_ == 0) {
+    setpgid(0, 0);
     dup2(ends[1], STDOUT_FILENO);
     const int nothing = open("/dev/null", O_WRONLY);
     dup2(nothing, STDERR_FILENO);
@@ -38,9 +41,13 @@ Program::Program(std::vector<std::string> arguments, std::string program) {
 }
 
 Program::~Program() {
-  kill(pid_, SIGINT);
+  kill(group_ ? -pid_ : pid_, SIGINT);
   close(out_);
-  waitpid(pid_, nullptr, 0);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (waitpid(pid_, nullptr, WNOHANG) == 0) {
+    if (std::chrono::steady_clock::now() > end) kill(-pid_, SIGKILL);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
 }
 
 std::string Program::output(const std::string& text, std::chrono::seconds at_most) {

@@ -24,6 +24,7 @@ class Program {
 
  private:
   pid_t pid_ = 0;
+  bool group_ = false;  // it does not end those that it has started itself
   int out_ = -1;
   std::string said_;
 };

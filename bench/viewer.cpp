@@ -1,6 +1,6 @@
 // `soda-bench viewer`: what it costs to watch. Sessions of 2 worlds over DDS in real time, in which hardly anything
-// costs time but telling of it: bodies that fly without gravity or contacts, all of them or one in twenty, the others
-// asleep. First nobody watches; then the gateway with a page that takes all it can get; then, where there are Node.js
+// costs time but telling of it: bodies that fly without gravity or contacts, all of them, or where one in
+// twenty turns and the others sleep. First nobody watches; then the gateway with a page that takes all it can get; then, where there are Node.js
 // and Chromium, the page itself in a browser without a window.
 #include <unistd.h>
 
@@ -31,7 +31,8 @@ constexpr double kSpeed = 0.5;  // m/s
 constexpr WorldId kWorlds = 2;
 constexpr const char* kToken = "token-of-the-bench";
 
-// Boxes in layers, each of which flies its own way as one: nothing meets. One in `moving_every` moves at all.
+// Boxes in layers, each of which flies its own way as one: nothing meets. Or one in `moving_every` turns in its place,
+// and the others sleep.
 Scene flying_boxes(int bodies, int moving_every) {
   SceneBuilder builder("flying boxes");
   builder.scene.gravity = Vec3::Zero();
@@ -42,9 +43,10 @@ Scene flying_boxes(int bodies, int moving_every) {
     Body& body = builder.add(Box{Vec3::Constant(0.5)}, kSpacing * Vec3(column, row, layer));
     body.colour = 0x3d7ea6ff;
     if (i % moving_every != 0) continue;
+    body.angular_velocity = Vec3(0.3, 0.6, 0.9);
+    if (moving_every > 1) continue;  // it would meet those that rest
     const double turn = layer * 1.3;
     body.linear_velocity = kSpeed * Vec3(std::cos(turn), std::sin(turn), 0);
-    body.angular_velocity = Vec3(0.1, 0.2, 0.3);
   }
   return builder.finish();
 }

@@ -21,13 +21,18 @@ running+=($!)
 running+=($!)
 until url=$(grep -o 'http://[^ ]*' "$folder/view.log"); do sleep 0.1; done
 
+# Software draws a picture in seconds: the session is held meanwhile, early, while much still moves.
+sleep 5
+"$bin/soda" pause --session "$session"
+
 # NAME HASH KEYS: keys pressed one after the other (docs/viewer.md, or `?` on the page, says what they do)
 shot() {
   echo "$1 ..."
   npm --prefix client/viewer/page run --silent shots -- --url "$url" --out "$out" --name "$1" --format jpeg \
-    --hash "quality=high&$2" --keys "$3" --step 150 --width 1280 --height 760 "${@:4}"
+    --hash "quality=high&$2" --keys "$3" --width 1280 --height 860 "${@:4}"
 }
-shot viewer "colour=body" ""
-shot viewer_worlds "colour=world&show=bnm" ""
-shot viewer_future "colour=speed" "Shift+ArrowRight Shift+ArrowRight"
-shot viewer_light "colour=sleep&show=b" "" --light
+near=cam=30,-34,17,8,-2,0
+shot viewer "$near&colour=body" ""
+shot viewer_worlds "$near&colour=world&show=bnm" ""
+shot viewer_future "$near&colour=speed" "Shift+ArrowRight Shift+ArrowRight Shift+ArrowRight"
+shot viewer_light "$near&colour=sleep&show=b" "" --light

@@ -82,6 +82,7 @@ int replay(ViewOptions options) {
   StopSignals signals;
   const viewer::StaticFiles files(page_of(options));
   viewer::ReplaySource source(options.recording);
+  if (!source.cut().empty()) std::printf("not whole: %s; what is there is shown\n", source.cut().c_str());
   const auto gateway = open(options, files, options.recording, true);
   gateway->run(source, [&] { return signals.received() != 0; });
   return kExitOk;
@@ -91,7 +92,10 @@ void add_page_options(CLI::App& command, ViewOptions& o) {
   command.add_option("--port,-p", o.http.port, "to serve the page at; 0: any that is free")->capture_default_str();
   command.add_option("--address", o.http.address, "to listen at; others than this machine's own only with care")
       ->capture_default_str();
-  command.add_option("--token", o.http.token, "who has it in the link may act, others only watch; by default random")
+  command
+      .add_option(
+          "--token", o.http.token,
+          "who has it in the link may act, others only watch; by default random, and none is needed for a recording")
       ->check([](const std::string& token) {
         const bool good = token.size() >= 8 && token.find_first_not_of(
                                                    "0123456789abcdefghijklmnopqrstuvwxyz"

@@ -108,7 +108,7 @@ void Gateway::look() {
     view::ToPage message;
     *message.mutable_clocks() = source_->clocks();
     for (const auto& [key, page] : pages)
-      if (page->is_open()) page->tell_newest(message);
+      if (page->is_open() && !page->forgotten()) page->tell_newest(message);
   }
   if (now - worlds_at_ >= kWorldsEvery && source_->ready()) {
     worlds_at_ = now;

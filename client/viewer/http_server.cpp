@@ -154,7 +154,7 @@ HttpServer::HttpServer(asio::io_context& io, const HttpOptions& options, const S
   if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
   if (error)
     throw std::runtime_error("cannot listen at " + options.address + " port " + std::to_string(options.port) + ": " +
-                             error.message());
+                             error.message() + "; another one: --port, 0 for any that is free");
   accept();
 }
 

@@ -73,7 +73,8 @@ void LiveSource::watch_worlds(News& news) {
       watched.before = *world.status;
       watched.then = now;
     }
-    const bool silent = world.silent(now) && world.status->state() != wire::STATE_DONE;
+    // Of a session that is over nothing more is expected.
+    const bool silent = world.silent(now) && world.status->state() != wire::STATE_DONE && client_.ended().empty();
     if (std::exchange(watched.silent, silent) != silent)
       news.events.push_back("world " + std::to_string(w) +
                             (silent ? " has fallen silent: it hangs, or is gone" : " is heard of again"));
@@ -90,6 +91,7 @@ void LiveSource::watch_worlds(News& news) {
 }
 
 void LiveSource::note_speed() {
+  if (!client_.control() || !client_.ended().empty()) return;
   const auto now = Clock::now();
   displayed_.emplace_back(now, displayed());
   while (displayed_.size() > 2 && now - displayed_.front().first > 1s) displayed_.pop_front();
@@ -144,7 +146,8 @@ view::Clocks LiveSource::clocks() const {
     clock.set_clock(std::max<Step>(buffer->clock(w), status ? status->clock() : 0));
     clock.set_front(buffer->front(w) >= 0 ? buffer->front(w) : status ? status->front() : 0);
     clock.set_final(std::max<Step>(buffer->final_step(w), status ? status->final_step() : 0));
-    clock.set_silent(client_.worlds()[w].silent(now) && !(status && status->state() == wire::STATE_DONE));
+    clock.set_silent(client_.worlds()[w].silent(now) && !(status && status->state() == wire::STATE_DONE) &&
+                     client_.ended().empty());
     final_step = std::min<Step>(final_step, clock.final());
   }
   clocks.set_final(final_step);

@@ -116,6 +116,7 @@ void PageLink::welcome(const Source& source) {
   told_bodies_ = false;
   look_.set_offset(0);
   frames_.begin_another();
+  forgotten_ = false;
   welcomed_ = true;
   tell(std::move(message));
   tell_bodies(source);

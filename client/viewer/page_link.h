@@ -40,7 +40,11 @@ class PageLink : public std::enable_shared_from_this<PageLink> {
   bool welcomed() const { return welcomed_; }
   // Tells the scene. Before that, nothing else should be told. Once more when another source is to be shown.
   void welcome(const Source& source);
-  void forget() { welcomed_ = ended_ = false; }  // its source is gone
+  void forget() {  // its source is gone
+    forgotten_ = forgotten_ || welcomed_;
+    welcomed_ = ended_ = false;
+  }
+  bool forgotten() const { return forgotten_; }  // shows a source that is gone, until the next welcome
   void tell_bodies(const Source& source);        // those that it has not been told
   void show(const Source& source);               // a frame, if there is something new and the page is ready for it
   void tell_ended(const End& end);               // once
@@ -59,7 +63,8 @@ class PageLink : public std::enable_shared_from_this<PageLink> {
   const bool may_act_;
   Handlers handlers_;
   boost::beast::flat_buffer incoming_;
-  bool open_ = false, welcomed_ = false, told_bodies_ = false, writing_ = false, closing_ = false, ended_ = false;
+  bool open_ = false, welcomed_ = false, told_bodies_ = false, forgotten_ = false, writing_ = false, closing_ = false,
+       ended_ = false;
   std::string outgoing_;  // being written
   std::deque<std::string> queue_;
   std::size_t queued_bytes_ = 0;

@@ -18,6 +18,7 @@ ReplaySource::ReplaySource(const std::filesystem::path& path) : name_(path.filen
     throw RecordingError(path.string() + ": it has no poses to show (recorded with --record-poses 0?)");
   model_ = std::make_unique<SceneModel>(recording.scene, 0);
   dt_ = recording.scene.dt;
+  cut_ = recording.cut;
   fill(recording);
 }
 
@@ -62,7 +63,7 @@ void ReplaySource::fill(const Recording& recording) {
 News ReplaySource::poll() {
   const auto now = Clock::now();
   const double passed = std::chrono::duration<double>(now - std::exchange(then_, now)).count();
-  if (!paused_) at_ = std::min(at_ + passed * speed_ / dt_, static_cast<double>(last_));
+  if (!paused_ && seen_) at_ = std::min(at_ + passed * speed_ / dt_, static_cast<double>(last_));
   News news;
   news.answers = std::exchange(answers_, {});
   return news;
@@ -71,6 +72,7 @@ News ReplaySource::poll() {
 Step ReplaySource::displayed() const { return static_cast<Step>(std::floor(at_)); }
 
 view::Welcome ReplaySource::welcome() const {
+  seen_ = true;
   view::Welcome welcome;
   model_->fill(welcome);
   welcome.set_session(name_);
@@ -92,7 +94,7 @@ view::Clocks ReplaySource::clocks() const {
   view::Clocks clocks;
   clocks.set_displayed(displayed());
   clocks.set_pace(speed_);
-  clocks.set_paused(paused_);
+  clocks.set_paused(paused_ || displayed() == last_);
   clocks.set_speed(paused_ || displayed() == last_ ? 0 : speed_);
   clocks.set_oldest(first_);
   clocks.set_newest(last_);

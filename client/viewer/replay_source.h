@@ -17,6 +17,7 @@ class ReplaySource final : public Source {
  public:
   // Loads all of it. Throws RecordingError where that cannot be, or it has no poses.
   explicit ReplaySource(const std::filesystem::path& path);
+  const std::string& cut() const { return cut_; }  // why the file is not whole, or ""
 
   News poll() override;
   bool ready() const override { return true; }
@@ -35,6 +36,7 @@ class ReplaySource final : public Source {
   void fill(const Recording& recording);
 
   const std::string name_;
+  std::string cut_;
   std::unique_ptr<SceneModel> model_;
   buffer::TransformBuffer buffer_{1};
   double dt_ = 0;
@@ -42,6 +44,7 @@ class ReplaySource final : public Source {
   double at_ = 0;              // steps, displayed, with fraction
   double speed_ = 1;           // multiple of real time
   bool paused_ = false;
+  mutable bool seen_ = false;  // by some page: it begins with the first
   Clock::time_point then_ = Clock::now();
   std::uint64_t asked_ = 0;
   std::vector<std::pair<std::uint64_t, view::Answer>> answers_;

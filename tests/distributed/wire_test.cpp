@@ -204,7 +204,7 @@ TEST(Wire, ImpossibleValuesAreRefused) {
   refused(good_entry(), [](auto& s) { s.number(0); });
   refused(wire::Answer(), [](auto& s) { s.step(-1); });
   refused(wire::Control(), [](auto& s) { s.closed(-1); });
-  refused(wire::Control(), [](auto& s) { s.phase(4); });
+  refused(wire::Control(), [](auto& s) { s.phase(5); });
   refused(wire::Status(), [](auto& s) { s.state(9); });
   refused(wire::Status(), [](auto& s) { s.final_step(5); });  // beyond the clock
 }
