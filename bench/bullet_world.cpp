@@ -90,8 +90,8 @@ struct BulletWorld::World {
     btRigidBody::btRigidBodyConstructionInfo info(body.is_static ? 0 : body.inertial.mass, nullptr, shape,
                                                   body.is_static ? btVector3(0, 0, 0) : to_bullet(inertia));
     info.m_startWorldTransform = to_bullet(body.pose * Pose{body.inertial.centre, Quat::Identity()});
-    info.m_friction = std::sqrt(body.friction);  // Bullet multiplies the two
-    info.m_restitution = body.restitution;
+    info.m_friction = std::sqrt(body.friction);        // Bullet multiplies the two
+    info.m_restitution = std::sqrt(body.restitution);  // likewise; as ours where both bodies have the same
     info.m_linearDamping = body.linear_damping;
     info.m_angularDamping = body.angular_damping;
     bodies.push_back(std::make_unique<btRigidBody>(info));
@@ -144,6 +144,21 @@ void BulletWorld::step() {
 Vec3 BulletWorld::position(std::size_t body) const {
   const btVector3& x = world_->bodies[world_->dynamic[body]]->getWorldTransform().getOrigin();
   return Vec3(x.x(), x.y(), x.z());
+}
+
+void BulletWorld::read(std::vector<BodyState>& states) const {
+  const auto vec = [](const btVector3& v) { return Vec3(v.x(), v.y(), v.z()); };
+  states.resize(world_->dynamic.size());
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const btRigidBody& body = *world_->bodies[world_->dynamic[i]];
+    BodyState& state = states[i];
+    const btQuaternion q = body.getOrientation();
+    state.id = world_->scene.bodies[world_->dynamic[i]].id;
+    state.set_x(vec(body.getCenterOfMassPosition()));
+    state.set_q(Quat(q.w(), q.x(), q.y(), q.z()));
+    state.set_v(vec(body.getLinearVelocity()));
+    state.set_w(vec(body.getAngularVelocity()));
+  }
 }
 
 }  // namespace soda::bench

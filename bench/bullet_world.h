@@ -3,7 +3,9 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
+#include "common/body_state.h"
 #include "common/scene/scene.h"
 
 namespace soda::bench {
@@ -14,8 +16,9 @@ class BulletWorld {
   explicit BulletWorld(const Scene& scene);
   ~BulletWorld();
 
-  void step();                            // by the scene's dt
-  Vec3 position(std::size_t body) const;  // m, centre of mass; by position among the scene's dynamic bodies
+  void step();                                      // by the scene's dt
+  Vec3 position(std::size_t body) const;            // m, centre of mass; by position among the scene's dynamic bodies
+  void read(std::vector<BodyState>& states) const;  // of all dynamic bodies, in the scene's order; replaces `states`
 
  private:
   struct World;

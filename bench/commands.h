@@ -11,5 +11,6 @@ void response(const Options& options, Headline& headline);  // from a push until
 void rollback(const Options& options, Headline& headline);  // repairing, computing ahead, and the window's memory
 void viewer(const Options& options, Headline& headline);    // what watching costs
 void latency(const Options& options, Headline& headline);   // what users notice
+void accuracy(const Options& options, Headline& headline);  // errors against cost, beside stock Bullet
 
 }  // namespace soda::bench

@@ -10,10 +10,11 @@
 namespace soda::bench {
 
 struct Options {
-  std::filesystem::path out;   // directory for CSV files and pictures; made when missing; empty: none are written
-  std::filesystem::path json;  // file for the headline numbers; empty: none
-  bool quick = false;          // smaller and shorter: to see that it works, not to measure
-  int rounds = 0;              // repetitions; 0: the command's own choice
+  std::filesystem::path out;       // directory for CSV files and pictures; made when missing; empty: none are written
+  std::filesystem::path json;      // file for the headline numbers; empty: none
+  bool quick = false;              // smaller and shorter: to see that it works, not to measure
+  int rounds = 0;                  // repetitions; 0: the command's own choice
+  std::vector<std::string> cases;  // of `accuracy`; empty: all
 };
 
 // The headline numbers of a run: printed at the end and written as one flat JSON object, in the order added.

@@ -10,6 +10,7 @@ namespace {
 struct Command {
   const char *name, *summary;
   void (*run)(const soda::bench::Options&, soda::bench::Headline&);
+  bool has_cases = false;
 };
 
 constexpr Command kCommands[] = {
@@ -21,6 +22,8 @@ constexpr Command kCommands[] = {
      soda::bench::rollback},
     {"latency", "a push in a city, and frames missed while first one world is slow and then the other",
      soda::bench::latency},
+    {"accuracy", "errors of known motions against their cost, for many step settings and stock Bullet",
+     soda::bench::accuracy, true},
 };
 
 }  // namespace
@@ -33,7 +36,11 @@ int main(int argc, char** argv) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
     sub->add_option("--out", options.out, "directory for CSV files and pictures");
     sub->add_option("--json", options.json, "file for the headline numbers");
-    sub->add_option("--rounds", options.rounds, "repetitions of which the median is taken")->check(CLI::Range(1, 100));
+    if (command.has_cases)
+      sub->add_option("CASE", options.cases, "such as A11; without any: all");
+    else
+      sub->add_option("--rounds", options.rounds, "repetitions of which the median is taken")
+          ->check(CLI::Range(1, 100));
     sub->add_flag("--quick", options.quick, "small and short: to see that it works, not to measure");
   }
   CLI11_PARSE(app, argc, argv);

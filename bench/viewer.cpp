@@ -1,7 +1,7 @@
 // `soda-bench viewer`: what it costs to watch. Sessions of 2 worlds over DDS in real time, in which hardly anything
 // costs time but telling of it: bodies that fly without gravity or contacts, all of them, or where one in
-// twenty turns and the others sleep. First nobody watches; then the gateway with a page that takes all it can get; then, where there are Node.js
-// and Chromium, the page itself in a browser without a window.
+// twenty turns and the others sleep. First nobody watches; then the gateway with a page that takes all it can get;
+// then, where there are Node.js and Chromium, the page itself in a browser without a window.
 #include <unistd.h>
 
 #include <algorithm>
@@ -244,10 +244,10 @@ void viewer(const Options& options, Headline& headline) {
        "set xlabel 'bodies'\nset ylabel 'MB/s to the page'\nset y2label 'cores of the gateway'\nset y2tics\nset ytics "
        "nomirror\n"
        "set logscale x\nset key top left\nset datafile separator ','\nset yrange [0:*]\nset y2range [0:*]\n"
-       "plot 'viewer.csv' using ($2 == 1 ? $1 : 1/0):($7 / 1e6) with linespoints title 'all move, MB/s', "
-       "'' using ($2 == 0 ? $1 : 1/0):($7 / 1e6) with linespoints title '1 of 20 moves, MB/s', "
-       "'' using ($2 == 1 ? $1 : 1/0):6 axes x1y2 with linespoints title 'all move, cores', "
-       "'' using ($2 == 0 ? $1 : 1/0):6 axes x1y2 with linespoints title '1 of 20 moves, cores'\n");
+       "plot 'viewer.csv' skip 1 every 2::1 using 1:($7 / 1e6) with linespoints title 'all move, MB/s', "
+       "'' skip 1 every 2::0 using 1:($7 / 1e6) with linespoints title '1 of 20 moves, MB/s', "
+       "'' skip 1 every 2::1 using 1:6 axes x1y2 with linespoints title 'all move, cores', "
+       "'' skip 1 every 2::0 using 1:6 axes x1y2 with linespoints title '1 of 20 moves, cores'\n");
 }
 
 }  // namespace soda::bench

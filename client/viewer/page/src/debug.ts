@@ -8,6 +8,7 @@ type Id = number | bigint | string;
 
 export interface SodaDebug {
   bodiesDrawn(): number;
+  staticTriangles(): number; // of what stands still
   step(): number; // of the picture
   displayed(): number; // that the session shows to those who are live
   anticipated(): boolean; // the picture may still change
@@ -41,6 +42,7 @@ export function expose(picture: Picture, session: Session, requests: Requests, r
   };
   window.soda = {
     bodiesDrawn: () => picture.instances.drawn,
+    staticTriangles: () => picture.statics.triangles(),
     step: () => picture.playback?.step() ?? 0,
     displayed: () => session.displayed,
     anticipated: () => picture.playback?.anticipated ?? false,

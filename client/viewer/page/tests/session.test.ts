@@ -74,6 +74,7 @@ describe('the page and a session', { skip: lacks ?? false }, () => {
     assert.equal(worlds.world.length, 4);
     assert.equal(worlds.world.reduce((sum, w) => sum + Number(w.bodies), 0), bodies);
     assert.equal(await page.evaluate(() => window.soda.bodiesDrawn()), bodies);
+    assert.equal(await page.evaluate(() => window.soda.staticTriangles()), 12, 'the ground is a box');
     assert.equal((await positions(page)).filter((p) => p !== null).length, bodies);
     await page.waitForFunction((text) => document.querySelector('.panel-head')?.textContent === text, `4 worlds · ${bodies} bodies`, limit);
     assert.deepEqual(await page.locator('#panel .card .name').allInnerTexts(), ['world 0', 'world 1', 'world 2', 'world 3']);

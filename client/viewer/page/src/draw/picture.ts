@@ -30,7 +30,7 @@ export class Picture {
   readonly instances: Instances;
   readonly colours: BodyColours;
   playback: Playback | null = null;
-  private statics: Statics;
+  readonly statics: Statics;
   private territory: Territory;
   private labels: Labels;
   private occlusion: Occlusion;

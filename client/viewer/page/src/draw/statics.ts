@@ -57,12 +57,14 @@ export class Statics {
     this.uniforms.uUp.value.copy(up);
     this.setOwners(grid);
     for (const item of list) {
-      const source = meshes[item.mesh];
-      if (!source) continue;
+      const told = meshes[item.mesh];
+      const source = told?.like === undefined ? told : meshes[told.like];
+      if (!told || !source) continue;
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', new BufferAttribute(floats(source.positions), 3));
       geometry.setAttribute('normal', new BufferAttribute(floats(source.normals), 3));
       geometry.setIndex(new BufferAttribute(new Uint32Array(source.indices.slice().buffer as ArrayBuffer), 1));
+      if (source !== told) geometry.scale(told.stretch[0] ?? 1, told.stretch[1] ?? 1, told.stretch[2] ?? 1);
       const mesh = new Mesh(geometry, this.material(item.colour));
       const [x, y, z] = item.position;
       const [i, j, k, w] = item.orientation;
@@ -76,6 +78,11 @@ export class Statics {
       this.scene.add(mesh);
       this.pieces.push({ mesh, box, material: mesh.material });
     }
+  }
+
+  // Triangles of all of them.
+  triangles(): number {
+    return this.pieces.reduce((sum, { mesh }) => sum + (mesh.geometry.index?.count ?? 0) / 3, 0);
   }
 
   clear(): void {
