@@ -25,17 +25,21 @@ Scene bouncing(double higher) {
   return builder.finish();
 }
 
-class BouncingProbe : public Probe {
+class EnergyProbe : public Probe {
  public:
-  explicit BouncingProbe(const Scene& scene) : energy_(scene) {}
+  explicit EnergyProbe(const Scene& scene) : energy_(scene) {}
   bool look(double, Bodies bodies) override {
     energy_.look(bodies);
     return true;
   }
-  std::vector<double> errors() const override { return {std::abs(energy_.end()), energy_.rise()}; }
 
- private:
+ protected:
   EnergyWatch energy_;
+};
+
+struct BouncingProbe final : EnergyProbe {
+  using EnergyProbe::EnergyProbe;
+  std::vector<double> errors() const override { return {std::abs(energy_.end()), energy_.rise()}; }
 };
 
 // ---- A7, A8: a cube of 6 x 6 x 6 balls falls and runs apart (the "666" of SimBenchmark, J. Hwangbo et al.)
@@ -69,19 +73,11 @@ class PenetrationProbe : public Probe {
   double sum_ = 0, largest_ = 0, looks_ = 0;
 };
 
-class ElasticProbe : public Probe {
- public:
-  explicit ElasticProbe(const Scene& scene) : energy_(scene) {}
-  bool look(double, Bodies bodies) override {
-    energy_.look(bodies);
-    return true;
-  }
+struct ElasticProbe final : EnergyProbe {
+  using EnergyProbe::EnergyProbe;
   std::vector<double> errors() const override {
     return {energy_.rise(), std::abs(energy_.end()), energy_.mean_square()};
   }
-
- private:
-  EnergyWatch energy_;
 };
 
 // ---- A16: balls shot at a thin wall, at each speed in 40 phases of the step

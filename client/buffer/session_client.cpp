@@ -54,7 +54,7 @@ SessionClient::SessionClient(const dds::NetworkOptions& network, const std::stri
   hear<wire::Status>(dds::status_topic());
   hear<wire::LogEntry>(dds::action_log_topic());
   hear<wire::Answer>(dds::answer_topic());
-  if (following_.transforms) hear_transforms();
+  if (following_.transforms) hear<wire::Transforms>(dds::transforms_topic());
   hear<wire::Session>(dds::session_topic());
 }
 
@@ -62,34 +62,30 @@ SessionClient::~SessionClient() { readers_.clear(); }
 
 template <class T>
 void SessionClient::hear(const dds::Topic& topic) {
-  readers_.push_back(std::make_shared<dds::Reader<T>>(participant_, topic, [this](T&& sample, const dds::WriterKey&) {
-    {
-      const std::lock_guard lock(mutex_);
-      queue_.emplace_back(std::move(sample));
-    }
-    changed_.notify_one();
-    if (following_.on_news) following_.on_news();
-  }));
-}
-
-// Nobody holds worlds up, so what is not taken in time cannot be kept without end.
-void SessionClient::hear_transforms() {
-  readers_.push_back(std::make_shared<dds::Reader<wire::Transforms>>(
-      participant_, dds::transforms_topic(), [this](wire::Transforms&& sample, const dds::WriterKey& writer) {
+  readers_.push_back(
+      std::make_shared<dds::Reader<T>>(participant_, topic, [this](T&& sample, const dds::WriterKey& writer) {
         {
           const std::lock_guard lock(mutex_);
-          queued_bytes_ += bytes_of(sample);
-          if (queued_bytes_ > kMostQueued) {
-            std::erase_if(queue_, [](const News& news) { return std::holds_alternative<Told>(news); });
-            queued_bytes_ = 0;
-            dropped_ = true;
-          } else {
-            queue_.emplace_back(Told{std::move(sample), writer});
-          }
+          if constexpr (std::is_same_v<T, wire::Transforms>)
+            keep(Told{std::move(sample), writer});
+          else
+            queue_.emplace_back(std::move(sample));
         }
         changed_.notify_one();
         if (following_.on_news) following_.on_news();
       }));
+}
+
+// Nobody holds worlds up, so what is not taken in time cannot be kept without end.
+void SessionClient::keep(Told&& told) {
+  queued_bytes_ += bytes_of(told.sample);
+  if (queued_bytes_ <= kMostQueued) {
+    queue_.emplace_back(std::move(told));
+    return;
+  }
+  std::erase_if(queue_, [](const News& news) { return std::holds_alternative<Told>(news); });
+  queued_bytes_ = 0;
+  dropped_ = true;
 }
 
 void SessionClient::poll(std::chrono::milliseconds at_most) {

@@ -95,7 +95,7 @@ class SessionClient {
       std::variant<wire::Session, wire::SceneChunk, wire::Control, wire::Status, wire::LogEntry, wire::Answer, Told>;
   template <class T>
   void hear(const dds::Topic& topic);
-  void hear_transforms();
+  void keep(Told&& told);  // with mutex_ held
   void take(wire::Session&& sample);
   void take(wire::SceneChunk&& sample);
   void take(wire::Control&& sample);

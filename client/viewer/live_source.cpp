@@ -73,8 +73,7 @@ void LiveSource::watch_worlds(News& news) {
       watched.before = *world.status;
       watched.then = now;
     }
-    // Of a session that is over nothing more is expected.
-    const bool silent = world.silent(now) && world.status->state() != wire::STATE_DONE && client_.ended().empty();
+    const bool silent = this->silent(w, now);
     if (std::exchange(watched.silent, silent) != silent)
       news.events.push_back("world " + std::to_string(w) +
                             (silent ? " has fallen silent: it hangs, or is gone" : " is heard of again"));
@@ -88,6 +87,12 @@ void LiveSource::watch_worlds(News& news) {
     rollback.set_milliseconds(1000 * world.status->repair_seconds());
     news.rollbacks.push_back(rollback);
   }
+}
+
+bool LiveSource::silent(WorldId w, Clock::time_point now) const {
+  const buffer::SessionClient::World& world = client_.worlds()[w];
+  const bool done = world.status && world.status->state() == wire::STATE_DONE;
+  return world.silent(now) && !done && client_.ended().empty();
 }
 
 void LiveSource::note_speed() {
@@ -146,8 +151,7 @@ view::Clocks LiveSource::clocks() const {
     clock.set_clock(std::max<Step>(buffer->clock(w), status ? status->clock() : 0));
     clock.set_front(buffer->front(w) >= 0 ? buffer->front(w) : status ? status->front() : 0);
     clock.set_final(std::max<Step>(buffer->final_step(w), status ? status->final_step() : 0));
-    clock.set_silent(client_.worlds()[w].silent(now) && !(status && status->state() == wire::STATE_DONE) &&
-                     client_.ended().empty());
+    clock.set_silent(silent(w, now));
     final_step = std::min<Step>(final_step, clock.final());
   }
   clocks.set_final(final_step);

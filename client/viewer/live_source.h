@@ -44,6 +44,8 @@ class LiveSource final : public Source {
   };
   void watch_worlds(News& news);
   void note_speed();
+  // Nothing is heard of it, and something should be: not so of one that is done, nor of a session that is over.
+  bool silent(WorldId world, Clock::time_point now) const;
   view::WorldState state_of(WorldId world, Clock::time_point now);
 
   const std::string session_;

@@ -67,8 +67,6 @@ bool ViewFeed::report(const border::WorldCore& core, bool rest, Clock::time_poin
 
 bool ViewFeed::tell_all(const border::WorldCore& core) {
   const Step front = core.front();
-  const Step left = std::max<Step>(1, front - first_told_ - static_cast<Step>(told_.size()) + 1);
-  Step budget = std::max(kAtOnce, left / 4);
   const auto states = [&](Step step) -> const States& {
     return step < core.oldest() ? finals_.at(static_cast<std::size_t>(step - first_final_)) : core.states(step);
   };
@@ -77,6 +75,7 @@ bool ViewFeed::tell_all(const border::WorldCore& core) {
     told_.push_back(core.states(first_told_));
     tell(wire::VIEW_WHOLE, first_told_, States(), told_.back(), first_told_, core);
   }
+  Step budget = std::max(kAtOnce, (front - first_told_ - static_cast<Step>(told_.size()) + 1) / 4);
   // What is told of first_told_ is final.
   for (Step step = first_told_ + 1; step <= front; ++step) {
     const auto at = static_cast<std::size_t>(step - first_told_);
