@@ -80,7 +80,7 @@ class Arbiter {
 struct TimelineStats {
   std::uint64_t steps = 0;             // entries advanced to
   std::uint64_t bodies_computed = 0;   // results computed, first or again
-  std::uint64_t bodies_redone = 0;     // results that replaced other results of the same step
+  std::uint64_t bodies_redone = 0;     // results that replaced those of a step that had been there, also of bodies at rest
   std::uint64_t steps_redone = 0;      // rounds in which there were any
   std::uint64_t longest_rollback = 0;  // steps from a change to the clock, at most
 };

@@ -128,7 +128,7 @@ TEST_F(Viewer, OneMayActWithTheTokenOnly) {
   ASSERT_TRUE(page->until([&] { return !page->answers.empty(); }));
   EXPECT_TRUE(page->answers[0].accepted()) << page->answers[0].reason();
   EXPECT_TRUE(page->until([&, id = top] { return page->bodies[id].position[2] > before + 0.5f; })) << "it does not fly";
-  EXPECT_TRUE(page->until([&] { return !page->rollbacks.empty(); })) << "what it changed was not reported";
+  ASSERT_TRUE(page->until([&] { return !page->rollbacks.empty(); })) << "what it changed was not reported";
   EXPECT_GT(page->rollbacks[0].bodies(), 0u);
   EXPECT_GT(page->rollbacks[0].steps(), 0u);
   EXPECT_GT(page->redone, 0u) << "nothing was marked as done again";
