@@ -7,7 +7,7 @@ if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
 endif()
 set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
-set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g")
+set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1")
 
 find_program(CCACHE_PROGRAM ccache)
 if(CCACHE_PROGRAM)
@@ -18,7 +18,7 @@ endif()
 # have the same bits on every x86-64 host and in every build type.
 add_library(soda_flags INTERFACE)
 target_compile_options(soda_flags INTERFACE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor
-  -Werror -Wno-restrict # GCC 12 sees overlaps in std::string's operator+ that are not there (GCC bug 105651)
+  -Werror -Wno-restrict -Wno-stringop-overflow # GCC 12 sees overlaps and overflows in std::string that are not there (GCC bug 105651)
   -ffp-contract=off -fno-fast-math)
 target_include_directories(soda_flags INTERFACE ${PROJECT_SOURCE_DIR})
 

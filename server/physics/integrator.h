@@ -24,8 +24,15 @@ struct StepConstants {
 
 // A body while it is being stepped.
 struct MovingBody {
-  Vec3 v, w;           // m/s, rad/s
-  Vec3 moved, turned;  // m, rad: sums over the sub-steps so far
+  // As a Motion (solver_kernel.h).
+  alignas(32) Vec3 v;  // m/s
+  double v_pad = 0;
+  Vec3 w;  // rad/s
+  double w_pad = 0;
+  Vec3 moved;  // m: sum over the sub-steps so far
+  double moved_pad = 0;
+  Vec3 turned;  // rad, likewise
+  double turned_pad = 0;
   double inverse_mass;
   Mat3 inverse_inertia;  // world frame, at the start of the step
   Vec3 x;                // m, at the start of the step

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 
 #include "server/physics/contact_update.h"
 #include "server/physics/tuning.h"
@@ -17,6 +19,18 @@ double inverse_or_zero(double x) { return x > 0 ? 1 / x : 0; }
 // all that touch.
 constexpr double kTouching = 0.005;  // m
 
+void put(Lanes3& to, int lane, const Vec3& v) {
+  to.x[lane] = v.x();
+  to.y[lane] = v.y();
+  to.z[lane] = v.z();
+}
+
+Vec3 get(const Lanes3& from, int lane) { return Vec3(from.x[lane], from.y[lane], from.z[lane]); }
+
+static_assert(offsetof(MovingBody, v) == offsetof(Motion, v) && offsetof(MovingBody, w) == offsetof(Motion, w) &&
+              offsetof(MovingBody, moved) == offsetof(Motion, moved) &&
+              offsetof(MovingBody, turned) == offsetof(Motion, turned) && alignof(MovingBody) == alignof(Motion));
+
 }  // namespace
 
 IslandSolver::Softness IslandSolver::softness(bool with_static) const {
@@ -30,267 +44,191 @@ IslandSolver::Softness IslandSolver::softness(bool with_static) const {
   return {omega / a1, a2 * a3, a3};
 }
 
-void IslandSolver::prepare(std::span<const MovingBody> island, std::span<const std::uint32_t> slot_of,
-                           std::span<const std::uint32_t> contacts, std::span<const Ends> ends,
-                           std::span<const Surface> surfaces, std::span<const ContactRecord> records) {
-  constraints_.resize(contacts.size());
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const std::uint32_t index = contacts[i];
-    const ContactRecord& record = records[index];
-    Constraint& c = constraints_[i];
-    c.record = index;
-    c.a = slot_of[ends[index].a];
-    c.b = ends[index].b == kStaticSlot ? kStaticSlot : slot_of[ends[index].b];
-    c.count = record.count;
-    c.friction = surfaces[index].friction;
-    c.restitution = surfaces[index].restitution;
-    const MovingBody& a = island[c.a];
-    const MovingBody* b = c.b == kStaticSlot ? nullptr : &island[c.b];
-    const StaticModel* fixed = surfaces[index].fixed;
-    const Mat3 turn_a = turn_since(record.orientation_a, a.rotation);
-    const Mat3 turn_b = turn_since(record.orientation_b, b ? b->rotation : fixed->rotation);
-    const Vec3 b_minus_a = (b ? b->x : fixed->pose.position) - a.x;
-    c.inverse_mass_a = a.inverse_mass;
-    c.inverse_mass_b = b ? b->inverse_mass : 0;
-    c.normal = vec(record.normal);
-    c.tangent[0] = c.normal.unitOrthogonal();
-    c.tangent[1] = c.normal.cross(c.tangent[0]);
+std::pair<Batch*, int> IslandSolver::lane_for(std::uint32_t a, std::uint32_t b) {
+  bool fits = used_ > 0 && lanes_ < kLanes;
+  if (fits) {
+    const Batch& open = batches_[used_ - 1];
+    for (int l = 0; l < lanes_; ++l)
+      fits = fits && open.a[l] != a && open.a[l] != b && (open.b[l] == kNoBody || (open.b[l] != a && open.b[l] != b));
+  }
+  if (!fits) {
+    if (used_ == batches_.size()) batches_.emplace_back();
+    Batch& fresh = batches_[used_++];
+    std::memset(static_cast<void*>(&fresh), 0, sizeof fresh);
+    std::fill_n(fresh.a, kLanes, kNoBody);
+    std::fill_n(fresh.b, kLanes, kNoBody);
+    std::fill_n(fresh.record, kLanes, kNoBody);
+    lanes_ = 0;
+  }
+  return {&batches_[used_ - 1], lanes_++};
+}
 
-    const auto make_row = [&](const Vec3& ra, const Vec3& rb, const Vec3& direction, Row& row) {
-      row.a_turn = ra.cross(direction);
-      row.a_spin = a.inverse_inertia * row.a_turn;
-      if (b) {
-        row.b_turn = rb.cross(direction);
-        row.b_spin = b->inverse_inertia * row.b_turn;
+void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slot_a, std::uint32_t slot_b,
+                           const Surface& surface, const ContactRecord& record, Batch& batch, int lane) const {
+  const MovingBody& a = bodies[slot_a];
+  const MovingBody* const b = slot_b == kNoBody ? nullptr : &bodies[slot_b];
+  const Softness& soft = b ? soft_ : soft_static_;
+  batch.a[lane] = slot_a;
+  batch.b[lane] = slot_b;
+  batch.count[lane] = record.count;
+  batch.points = std::max(batch.points, record.count);
+  batch.bounces = batch.bounces || surface.restitution > 0;
+  batch.friction[lane] = surface.friction;
+  batch.restitution[lane] = surface.restitution;
+  batch.bias_rate[lane] = soft.bias_rate;
+  batch.mass_scale[lane] = soft.mass_scale;
+  batch.impulse_scale[lane] = soft.impulse_scale;
+  const double inverse_mass_b = b ? b->inverse_mass : 0, linear = a.inverse_mass + inverse_mass_b;
+  batch.inverse_mass_a[lane] = a.inverse_mass;
+  batch.inverse_mass_b[lane] = inverse_mass_b;
+
+  const Mat3 turn_a = turn_since(record.orientation_a, a.rotation);
+  const Mat3 turn_b = turn_since(record.orientation_b, b ? b->rotation : surface.fixed->rotation);
+  const Vec3 b_minus_a = (b ? b->x : surface.fixed->pose.position) - a.x;
+  const Vec3 normal = vec(record.normal);
+  const Vec3 tangent[2] = {normal.unitOrthogonal(), normal.cross(normal.unitOrthogonal())};
+  put(batch.normal, lane, normal);
+  for (int t = 0; t < 2; ++t) put(batch.tangent[t], lane, tangent[t]);
+
+  struct Made {
+    Vec3 a_turn, a_spin, b_turn, b_spin;
+  };
+  const auto make_row = [&](const Vec3& ra, const Vec3& rb, const Vec3& direction, Row& row) {
+    Made made;
+    made.a_turn = ra.cross(direction);
+    made.a_spin = a.inverse_inertia * made.a_turn;
+    put(row.a_turn, lane, made.a_turn);
+    put(row.a_spin, lane, made.a_spin);
+    if (b) {
+      made.b_turn = rb.cross(direction);
+      made.b_spin = b->inverse_inertia * made.b_turn;
+      put(row.b_turn, lane, made.b_turn);
+      put(row.b_spin, lane, made.b_spin);
+    }
+    return made;
+  };
+  const auto inverse_mass_of = [&](const Made& l, const Made& r) {
+    return l.a_turn.dot(r.a_spin) + (b ? l.b_turn.dot(r.b_spin) : 0.0);
+  };
+
+  Vec3 ra[kMaxContactPoints], rb[kMaxContactPoints];
+  double impulses[kMaxContactPoints], separations[kMaxContactPoints], carried = 0;
+  for (std::uint32_t k = 0; k < record.count; ++k) {
+    BatchPoint& p = batch.point[k];
+    // The distance follows the bodies' poses; the arms at which they are pushed stay as they were when detected.
+    ra[k] = vec(record.points[k].arm_a);
+    rb[k] = vec(record.points[k].arm_b);
+    separations[k] = normal.dot(b_minus_a + turn_b * rb[k] - turn_a * ra[k]);
+    impulses[k] = record.points[k].impulse;
+    carried += impulses[k];
+    const Made row = make_row(ra[k], rb[k], normal, p.row);
+    p.separation[lane] = separations[k];
+    p.mass[lane] = inverse_or_zero(linear + inverse_mass_of(row, row));
+    p.impulse[lane] = impulses[k];
+    p.approach[lane] = normal.dot((b ? b->v : Vec3(Vec3::Zero())) - a.v) - row.a_turn.dot(a.w) +
+                       (b ? row.b_turn.dot(b->w) : 0.0);
+  }
+
+  Vec3 centre_a = Vec3::Zero(), centre_b = Vec3::Zero();
+  double weight = 0;
+  for (std::uint32_t k = 0; k < record.count; ++k) {
+    const double w = carried > 0 ? impulses[k] : separations[k] < kTouching ? 1 : 1e-6;
+    centre_a += w * ra[k];
+    centre_b += w * rb[k];
+    weight += w;
+  }
+  centre_a /= weight;
+  centre_b /= weight;
+  for (std::uint32_t k = 0; k < record.count; ++k) {
+    const Vec3 arm = ra[k] - centre_a;
+    batch.point[k].arm[lane] = (arm - normal.dot(arm) * normal).norm();
+  }
+  const Vec3 friction = vec(record.friction);
+  Made slide[2];
+  for (int t = 0; t < 2; ++t) {
+    slide[t] = make_row(centre_a, centre_b, tangent[t], batch.slide[t]);
+    batch.slide_impulse[t][lane] = friction.dot(tangent[t]);
+  }
+  const double k00 = linear + inverse_mass_of(slide[0], slide[0]);
+  const double k11 = linear + inverse_mass_of(slide[1], slide[1]);
+  const double k01 = inverse_mass_of(slide[0], slide[1]);
+  const double inverse_determinant = inverse_or_zero(k00 * k11 - k01 * k01);
+  batch.k00[lane] = k11 * inverse_determinant;
+  batch.k11[lane] = k00 * inverse_determinant;
+  batch.k01[lane] = -k01 * inverse_determinant;
+
+  const Vec3 a_twist = a.inverse_inertia * normal;
+  const Vec3 b_twist = b ? Vec3(b->inverse_inertia * normal) : Vec3(Vec3::Zero());
+  put(batch.a_twist, lane, a_twist);
+  put(batch.b_twist, lane, b_twist);
+  if (record.count < 2) return;  // a single point does not hold against turning
+  batch.twist_mass[lane] = inverse_or_zero(normal.dot(a_twist + b_twist));
+  batch.twist_impulse[lane] = record.twist;
+}
+
+void IslandSolver::restitution(std::span<MovingBody> bodies) {
+  for (std::size_t i = 0; i < used_; ++i) {
+    Batch& batch = batches_[i];
+    if (!batch.bounces) continue;
+    for (int l = 0; l < kLanes; ++l) {
+      if (batch.restitution[l] <= 0) continue;
+      MovingBody& a = bodies[batch.a[l]];
+      MovingBody* const b = batch.b[l] == kNoBody ? nullptr : &bodies[batch.b[l]];
+      const Vec3 normal = get(batch.normal, l);
+      for (std::uint32_t k = 0; k < batch.count[l]; ++k) {
+        BatchPoint& p = batch.point[k];
+        const double approach = p.approach[l];
+        if (approach > -kRestitutionThreshold || p.most[l] == 0) continue;
+        const double vn = normal.dot((b ? b->v : Vec3(Vec3::Zero())) - a.v) - get(p.row.a_turn, l).dot(a.w) +
+                          (b ? get(p.row.b_turn, l).dot(b->w) : 0.0);
+        const double sum = std::max(p.impulse[l] - p.mass[l] * (vn + batch.restitution[l] * approach), 0.0);
+        const double impulse = sum - p.impulse[l];
+        p.impulse[l] = sum;
+        a.v -= (batch.inverse_mass_a[l] * impulse) * normal;
+        a.w -= impulse * get(p.row.a_spin, l);
+        if (!b) continue;
+        b->v += (batch.inverse_mass_b[l] * impulse) * normal;
+        b->w += impulse * get(p.row.b_spin, l);
       }
-    };
-    const auto inverse_mass_of = [&](const Row& l, const Row& r) {
-      return l.a_turn.dot(r.a_spin) + (b ? l.b_turn.dot(r.b_spin) : 0.0);
-    };
-    const double linear = c.inverse_mass_a + c.inverse_mass_b;
-
-    Vec3 ra[kMaxContactPoints], rb[kMaxContactPoints];
-    double carried = 0;
-    for (std::uint32_t k = 0; k < c.count; ++k) {
-      PointConstraint& p = c.points[k];
-      // The distance follows the bodies' poses; the arms at which they are pushed stay as they were when detected.
-      ra[k] = vec(record.points[k].arm_a);
-      rb[k] = vec(record.points[k].arm_b);
-      p.separation = c.normal.dot(b_minus_a + turn_b * rb[k] - turn_a * ra[k]);
-      make_row(ra[k], rb[k], c.normal, p.row);
-      p.mass = inverse_or_zero(linear + inverse_mass_of(p.row, p.row));
-      p.impulse = record.points[k].impulse;
-      p.most = 0;
-      p.approach = c.normal.dot((b ? b->v : Vec3(Vec3::Zero())) - a.v) - p.row.a_turn.dot(a.w) +
-                   (b ? p.row.b_turn.dot(b->w) : 0.0);
-      carried += p.impulse;
-    }
-
-    Vec3 centre_a = Vec3::Zero(), centre_b = Vec3::Zero();
-    double weight = 0;
-    for (std::uint32_t k = 0; k < c.count; ++k) {
-      const double w = carried > 0 ? c.points[k].impulse : c.points[k].separation < kTouching ? 1 : 1e-6;
-      centre_a += w * ra[k];
-      centre_b += w * rb[k];
-      weight += w;
-    }
-    centre_a /= weight;
-    centre_b /= weight;
-    for (std::uint32_t k = 0; k < c.count; ++k) {
-      const Vec3 arm = ra[k] - centre_a;
-      c.points[k].arm = (arm - c.normal.dot(arm) * c.normal).norm();
-    }
-    const Vec3 friction = vec(record.friction);
-    for (int t = 0; t < 2; ++t) {
-      make_row(centre_a, centre_b, c.tangent[t], c.slide[t]);
-      c.slide_impulse[t] = friction.dot(c.tangent[t]);
-    }
-    const double k00 = linear + inverse_mass_of(c.slide[0], c.slide[0]);
-    const double k11 = linear + inverse_mass_of(c.slide[1], c.slide[1]);
-    const double k01 = inverse_mass_of(c.slide[0], c.slide[1]);
-    const double inverse_determinant = inverse_or_zero(k00 * k11 - k01 * k01);
-    c.k00 = k11 * inverse_determinant;
-    c.k11 = k00 * inverse_determinant;
-    c.k01 = -k01 * inverse_determinant;
-
-    c.a_twist = a.inverse_inertia * c.normal;
-    c.b_twist = b ? Vec3(b->inverse_inertia * c.normal) : Vec3(Vec3::Zero());
-    c.twist_mass = inverse_or_zero(c.normal.dot(c.a_twist + c.b_twist));
-    c.twist_impulse = record.twist;
-  }
-}
-
-void IslandSolver::warm_start(std::span<MovingBody> island) {
-  for (const Constraint& c : constraints_) {
-    MovingBody& a = island[c.a];
-    Vec3 impulse = c.slide_impulse[0] * c.tangent[0] + c.slide_impulse[1] * c.tangent[1];
-    Vec3 spin_a =
-        c.slide_impulse[0] * c.slide[0].a_spin + c.slide_impulse[1] * c.slide[1].a_spin + c.twist_impulse * c.a_twist;
-    for (std::uint32_t k = 0; k < c.count; ++k) {
-      impulse += c.points[k].impulse * c.normal;
-      spin_a += c.points[k].impulse * c.points[k].row.a_spin;
-    }
-    a.v -= c.inverse_mass_a * impulse;
-    a.w -= spin_a;
-    if (c.b == kStaticSlot) continue;
-    MovingBody& b = island[c.b];
-    Vec3 spin_b =
-        c.slide_impulse[0] * c.slide[0].b_spin + c.slide_impulse[1] * c.slide[1].b_spin + c.twist_impulse * c.b_twist;
-    for (std::uint32_t k = 0; k < c.count; ++k) spin_b += c.points[k].impulse * c.points[k].row.b_spin;
-    b.v += c.inverse_mass_b * impulse;
-    b.w += spin_b;
-  }
-}
-
-template <bool kUseBias, bool kStatic>
-void IslandSolver::solve_constraint(Constraint& c, MovingBody& body_a, MovingBody* body_b, const Softness& soft) const {
-  Vec3 va = body_a.v, wa = body_a.w, vb = Vec3::Zero(), wb = Vec3::Zero();
-  Vec3 shift = -body_a.moved;
-  if constexpr (!kStatic) {
-    vb = body_b->v;
-    wb = body_b->w;
-    shift += body_b->moved;
-  }
-  const double along = c.normal.dot(shift);
-  const double inverse_h = 1 / constants_.h;
-
-  double total = 0, twist_limit = 0;
-  for (std::uint32_t k = 0; k < c.count; ++k) {
-    PointConstraint& p = c.points[k];
-    // Linear in the bodies' motion since the start of the step.
-    double s = p.separation + along - p.row.a_turn.dot(body_a.turned);
-    if constexpr (!kStatic) s += p.row.b_turn.dot(body_b->turned);
-    double bias = 0, mass_scale = 1, impulse_scale = 0;
-    if (s > 0) {
-      bias = s * inverse_h;  // not touching yet: may close the gap within the sub-step, no more
-    } else if constexpr (kUseBias) {
-      bias = std::max(soft.bias_rate * s, -kPushOutSpeed);
-      mass_scale = soft.mass_scale;
-      impulse_scale = soft.impulse_scale;
-    }
-    double vn = -p.row.a_turn.dot(wa);
-    if constexpr (kStatic) {
-      vn -= c.normal.dot(va);
-    } else {
-      vn += c.normal.dot(vb - va) + p.row.b_turn.dot(wb);
-    }
-    double impulse = -p.mass * mass_scale * (vn + bias) - impulse_scale * p.impulse;
-    const double sum = std::max(p.impulse + impulse, 0.0);
-    impulse = sum - p.impulse;
-    p.impulse = sum;
-    p.most = std::max(p.most, sum);
-    total += sum;
-    twist_limit += sum * p.arm;
-    va -= (c.inverse_mass_a * impulse) * c.normal;
-    wa -= impulse * p.row.a_spin;
-    if constexpr (!kStatic) {
-      vb += (c.inverse_mass_b * impulse) * c.normal;
-      wb += impulse * p.row.b_spin;
-    }
-  }
-
-  // Friction: a vector in the contact plane, projected on the disc of Coulomb's law.
-  {
-    double v0 = -c.tangent[0].dot(va) - c.slide[0].a_turn.dot(wa);
-    double v1 = -c.tangent[1].dot(va) - c.slide[1].a_turn.dot(wa);
-    if constexpr (!kStatic) {
-      v0 += c.tangent[0].dot(vb) + c.slide[0].b_turn.dot(wb);
-      v1 += c.tangent[1].dot(vb) + c.slide[1].b_turn.dot(wb);
-    }
-    double s0 = c.slide_impulse[0] - (c.k00 * v0 + c.k01 * v1);
-    double s1 = c.slide_impulse[1] - (c.k01 * v0 + c.k11 * v1);
-    const double limit = c.friction * total, square = s0 * s0 + s1 * s1;
-    if (square > limit * limit) {
-      const double scale = limit / std::sqrt(square);
-      s0 *= scale;
-      s1 *= scale;
-    }
-    const double d0 = s0 - c.slide_impulse[0], d1 = s1 - c.slide_impulse[1];
-    c.slide_impulse[0] = s0;
-    c.slide_impulse[1] = s1;
-    const Vec3 impulse = d0 * c.tangent[0] + d1 * c.tangent[1];
-    va -= c.inverse_mass_a * impulse;
-    wa -= d0 * c.slide[0].a_spin + d1 * c.slide[1].a_spin;
-    if constexpr (!kStatic) {
-      vb += c.inverse_mass_b * impulse;
-      wb += d0 * c.slide[0].b_spin + d1 * c.slide[1].b_spin;
-    }
-  }
-
-  if (c.count > 1) {  // turning about the normal; a single point offers no arm
-    double spin = -c.normal.dot(wa);
-    if constexpr (!kStatic) spin += c.normal.dot(wb);
-    const double limit = c.friction * twist_limit;
-    const double sum = std::clamp(c.twist_impulse - c.twist_mass * spin, -limit, limit);
-    const double d = sum - c.twist_impulse;
-    c.twist_impulse = sum;
-    wa -= d * c.a_twist;
-    if constexpr (!kStatic) wb += d * c.b_twist;
-  }
-
-  body_a.v = va;
-  body_a.w = wa;
-  if constexpr (!kStatic) {
-    body_b->v = vb;
-    body_b->w = wb;
-  }
-}
-
-template <bool kUseBias>
-void IslandSolver::pass(std::span<MovingBody> island) {
-  for (Constraint& c : constraints_) {
-    if (c.b == kStaticSlot)
-      solve_constraint<kUseBias, true>(c, island[c.a], nullptr, soft_static_);
-    else
-      solve_constraint<kUseBias, false>(c, island[c.a], &island[c.b], soft_);
-  }
-}
-
-void IslandSolver::restitution(std::span<MovingBody> island) {
-  for (Constraint& c : constraints_) {
-    if (c.restitution <= 0) continue;
-    MovingBody& a = island[c.a];
-    MovingBody* b = c.b == kStaticSlot ? nullptr : &island[c.b];
-    for (std::uint32_t k = 0; k < c.count; ++k) {
-      PointConstraint& p = c.points[k];
-      if (p.approach > -kRestitutionThreshold || p.most == 0) continue;
-      const double vn = c.normal.dot((b ? b->v : Vec3(Vec3::Zero())) - a.v) - p.row.a_turn.dot(a.w) +
-                        (b ? p.row.b_turn.dot(b->w) : 0.0);
-      double impulse = -p.mass * (vn + c.restitution * p.approach);
-      const double sum = std::max(p.impulse + impulse, 0.0);
-      impulse = sum - p.impulse;
-      p.impulse = sum;
-      a.v -= (c.inverse_mass_a * impulse) * c.normal;
-      a.w -= impulse * p.row.a_spin;
-      if (!b) continue;
-      b->v += (c.inverse_mass_b * impulse) * c.normal;
-      b->w += impulse * p.row.b_spin;
     }
   }
 }
 
 void IslandSolver::store(std::span<ContactRecord> records) const {
-  for (const Constraint& c : constraints_) {
-    ContactRecord& record = records[c.record];
-    for (std::uint32_t k = 0; k < c.count; ++k) record.points[k].impulse = c.points[k].impulse;
-    const Vec3 friction = c.slide_impulse[0] * c.tangent[0] + c.slide_impulse[1] * c.tangent[1];
-    for (int axis = 0; axis < 3; ++axis) record.friction[axis] = friction[axis];
-    record.twist = c.twist_impulse;
+  for (std::size_t i = 0; i < used_; ++i) {
+    const Batch& batch = batches_[i];
+    for (int l = 0; l < kLanes; ++l) {
+      if (batch.record[l] == kNoBody) continue;
+      ContactRecord& record = records[batch.record[l]];
+      for (std::uint32_t k = 0; k < record.count; ++k) record.points[k].impulse = batch.point[k].impulse[l];
+      const Vec3 friction =
+          batch.slide_impulse[0][l] * get(batch.tangent[0], l) + batch.slide_impulse[1][l] * get(batch.tangent[1], l);
+      for (int axis = 0; axis < 3; ++axis) record.friction[axis] = friction[axis];
+      record.twist = batch.twist_impulse[l];
+    }
   }
 }
 
-void IslandSolver::solve(std::span<MovingBody> island, std::span<const std::uint32_t> slot_of,
+void IslandSolver::solve(std::span<MovingBody> bodies, std::span<const std::uint32_t> slot_of,
                          std::span<const std::uint32_t> contacts, std::span<const Ends> ends,
                          std::span<const Surface> surfaces, std::span<ContactRecord> records) {
-  prepare(island, slot_of, contacts, ends, surfaces, records);
-  for (std::uint32_t i = 0; i < constants_.substeps; ++i) {
-    for (MovingBody& body : island) accelerate(body, constants_.h, constants_);
-    warm_start(island);
-    pass<true>(island);
-    for (MovingBody& body : island) move(body, constants_.h, constants_);
-    pass<false>(island);
+  used_ = 0;
+  for (const std::uint32_t index : contacts) {
+    const std::uint32_t a = slot_of[ends[index].a];
+    const std::uint32_t b = ends[index].b == kStaticSlot ? kNoBody : slot_of[ends[index].b];
+    const auto [batch, lane] = lane_for(a, b);
+    batch->record[lane] = index;
+    prepare(bodies, a, b, surfaces[index], records[index], *batch, lane);
   }
-  restitution(island);
+  const Bodies moving{reinterpret_cast<std::byte*>(bodies.data()), sizeof(MovingBody)};
+  for (std::uint32_t i = 0; i < constants_.substeps; ++i) {
+    for (MovingBody& body : bodies) accelerate(body, constants_.h, constants_);
+    kernel_->warm_start(batches_.data(), used_, moving);
+    kernel_->pass(batches_.data(), used_, moving, 1 / constants_.h, true);
+    for (MovingBody& body : bodies) move(body, constants_.h, constants_);
+    kernel_->pass(batches_.data(), used_, moving, 1 / constants_.h, false);
+  }
+  restitution(bodies);
   store(records);
 }
 

@@ -1,15 +1,17 @@
 // The island solver: TGS-soft, that is sub-steps with one pass over soft constraints each and one relaxing pass
 // (E. Catto, "Solver2D", 2024; sub-steps instead of iterations: Macklin et al., "Small Steps in Physics Simulation",
-// SCA 2019). Scalar, double precision.
+// SCA 2019). Double precision, four constraints at a time (solver_kernel.h).
 #pragma once
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/contact_record.h"
 #include "server/physics/integrator.h"
 #include "server/physics/islands.h"
+#include "server/physics/solver_kernel.h"
 
 namespace soda::physics {
 
@@ -25,60 +27,36 @@ class IslandSolver {
   explicit IslandSolver(const StepConstants& constants)
       : constants_(constants), soft_(softness(false)), soft_static_(softness(true)) {}
 
-  // Advances the bodies of one awake island by one step. `contacts` are positions in `records` (with `ends` and
-  // `surfaces` alongside), in solving order. `slot_of` maps a body's position in `ends` to its position in `island`.
-  // Impulses are written back into `records`.
-  void solve(std::span<MovingBody> island, std::span<const std::uint32_t> slot_of,
+  // Another kernel than the machine's best, for comparisons.
+  void use(const Kernel& kernel) { kernel_ = &kernel; }
+
+  // Advances the bodies of some awake islands by one step. `contacts` are positions in `records` (with `ends` and
+  // `surfaces` alongside), each island's in its solving order; between islands, which share no moving body, any order
+  // gives the same bits, and mixing them fills the lanes. `slot_of` maps a body's position in `ends` to its position in
+  // `bodies`. Impulses are written back into `records`.
+  void solve(std::span<MovingBody> bodies, std::span<const std::uint32_t> slot_of,
              std::span<const std::uint32_t> contacts, std::span<const Ends> ends, std::span<const Surface> surfaces,
              std::span<ContactRecord> records);
 
  private:
-  struct Row {            // one direction at one place
-    Vec3 a_turn, b_turn;  // r x direction, for each body: the angular Jacobian
-    Vec3 a_spin, b_spin;  // inverse inertia times that: change of angular velocity per unit of impulse
-  };
-  struct PointConstraint {
-    Row row;
-    double mass;        // effective mass along the normal, kg
-    double separation;  // m, at the start of the step
-    double impulse;     // N s, accumulated, of this sub-step
-    double most;        // N s, the largest impulse of the step: whether the point ever pushed
-    double approach;    // m/s, normal velocity before the step
-    double arm;         // m, from the friction centre, for the twist limit
-  };
-  struct Constraint {
-    std::uint32_t a, b;  // positions in the island; b may be kStaticSlot
-    std::uint32_t record;
-    std::uint32_t count;
-    double inverse_mass_a, inverse_mass_b;
-    double friction, restitution;
-    Vec3 normal, tangent[2];
-    PointConstraint points[kMaxContactPoints];
-    Row slide[2];
-    double k00, k01, k11;  // inverse of the 2 x 2 effective-mass matrix of the tangents, kg
-    double slide_impulse[2];
-    Vec3 a_twist, b_twist;  // inverse inertia times the normal
-    double twist_mass, twist_impulse;
-  };
   struct Softness {
     double bias_rate, mass_scale, impulse_scale;
   };
 
-  void prepare(std::span<const MovingBody> island, std::span<const std::uint32_t> slot_of,
-               std::span<const std::uint32_t> contacts, std::span<const Ends> ends, std::span<const Surface> surfaces,
-               std::span<const ContactRecord> records);
-  void warm_start(std::span<MovingBody> island);
-  template <bool kUseBias>
-  void pass(std::span<MovingBody> island);
-  template <bool kUseBias, bool kStatic>
-  void solve_constraint(Constraint& c, MovingBody& a, MovingBody* b, const Softness& soft) const;
-  void restitution(std::span<MovingBody> island);
+  // The next lane for a contact of these two bodies: in the newest batch if it has room and shares neither.
+  std::pair<Batch*, int> lane_for(std::uint32_t a, std::uint32_t b);
+  void prepare(std::span<const MovingBody> bodies, std::uint32_t a, std::uint32_t b, const Surface& surface,
+               const ContactRecord& record, Batch& batch, int lane) const;
+  void restitution(std::span<MovingBody> bodies);
   void store(std::span<ContactRecord> records) const;
   Softness softness(bool with_static) const;
 
   const StepConstants& constants_;
   Softness soft_, soft_static_;
-  std::vector<Constraint> constraints_;
+  const Kernel* kernel_ = &chosen_kernel();
+  std::vector<Batch> batches_;
+  std::size_t used_ = 0;  // of batches_
+  int lanes_ = 0;         // used in the newest
 };
 
 }  // namespace soda::physics

@@ -48,6 +48,8 @@ std::vector<Aabb> static_boxes(const Model& model) {
 // Broad-phase cells hold an ordinary body's reach box at moderate speed.
 double broad_cell(const Model& model) { return 1.1 * model.largest_ordinary_diameter() + 4 * kContactMargin; }
 
+constexpr std::size_t kGroupContacts = 256;  // of islands that are solved together; their batches stay in the cache
+
 }  // namespace
 
 Aabb reach_box(const BodyState& state, const BodyModel& model, const Mat3& rotation, const Model& scene) {
@@ -225,62 +227,100 @@ void Stepper::solve(std::span<BodyState> bodies, std::span<ContactRecord> contac
   for (std::size_t i = 0; i < bodies.size(); ++i) centres_[i] = bodies[i].x();
   surfaces_.resize(contacts.size());
   island_slot_.resize(bodies.size());
+  const auto solve_group = [&] {
+    clock.lap(times.order);
+    mix_group();
+    solver_.solve(std::span(moving_).first(moving_used_), island_slot_, mixed_, ends, surfaces_, contacts);
+    for (const Grouped& one : group_) finish(bodies, contacts, islands, one);
+    group_.clear();
+    sorted_.clear();
+    moving_used_ = 0;
+    clock.lap(times.solve);
+  };
   for (const std::uint32_t island : which) {
     const auto members = islands.bodies_of(island);
     if (std::all_of(members.begin(), members.end(), [&](std::uint32_t i) { return bodies[i].asleep(); })) continue;
     const auto touching = islands.contacts_of(island);
-    moving_.resize(members.size());
+    const Grouped one{island, static_cast<std::uint32_t>(moving_used_), static_cast<std::uint32_t>(sorted_.size()),
+                      static_cast<std::uint32_t>(touching.size())};
+    moving_used_ += members.size();
+    if (moving_used_ > moving_.size()) moving_.resize(std::max(moving_used_, 2 * moving_.size()));
     for (std::uint32_t k = 0; k < members.size(); ++k) {
-      island_slot_[members[k]] = k;
+      island_slot_[members[k]] = one.first_body + k;
       BodyState& state = bodies[members[k]];
       if (state.asleep()) state.quiet_steps = 0;  // woken: has to come to rest anew
-      begin_step(state, *model_.find(state.id), moving_[k]);
+      begin_step(state, *model_.find(state.id), moving_[one.first_body + k]);
     }
     if (touching.empty()) {
-      fly(moving_[0], constants_);
-    } else {
-      for (const std::uint32_t c : touching) {
-        const BodyModel& a = *moving_[island_slot_[ends[c].a]].model;
-        Surface& surface = surfaces_[c];
-        double friction, restitution;
-        if (ends[c].b == kStaticSlot) {
-          surface.fixed = model_.find_static(contacts[c].b & ~kStaticBit);
-          friction = surface.fixed->friction, restitution = surface.fixed->restitution;
-        } else {
-          const BodyModel& b = *moving_[island_slot_[ends[c].b]].model;
-          surface.fixed = nullptr;
-          friction = b.friction, restitution = b.restitution;
-        }
-        surface.friction = std::sqrt(a.friction * friction);
-        surface.restitution = std::max(a.restitution, restitution);
-      }
-      sorted_.assign(touching.begin(), touching.end());
-      order_.sort(sorted_, ends, centres_);
-      clock.lap(times.order);
-      solver_.solve(moving_, island_slot_, sorted_, ends, surfaces_, contacts);
-      ++counters.islands;
+      fly(moving_[one.first_body], constants_);
+      finish(bodies, contacts, islands, one);
+      moving_used_ = one.first_body;
+      clock.lap(times.solve);
+      continue;
     }
-    bool quiet = constants_.sleeping, finite = true;
-    for (std::uint32_t k = 0; k < members.size(); ++k) {
-      BodyState& state = bodies[members[k]];
-      if (!end_step(moving_[k], constants_, state)) {
-        ++counters.non_finite;
-        finite = false;
-      }
-      counters.clamped += moving_[k].clamped;
-      quiet = quiet && state.quiet_steps >= constants_.quiet_steps_to_sleep;
+    for (const std::uint32_t c : touching) find_surface(contacts[c], ends[c], surfaces_[c]);
+    sorted_.insert(sorted_.end(), touching.begin(), touching.end());
+    order_.sort(std::span(sorted_).subspan(one.first_contact), ends, centres_);
+    group_.push_back(one);
+    ++counters.islands;
+    if (sorted_.size() >= kGroupContacts) solve_group();
+  }
+  if (!group_.empty()) solve_group();
+}
+
+void Stepper::find_surface(const ContactRecord& contact, const Ends& ends, Surface& surface) const {
+  const BodyModel& a = *moving_[island_slot_[ends.a]].model;
+  double friction, restitution;
+  if (ends.b == kStaticSlot) {
+    surface.fixed = model_.find_static(contact.b & ~kStaticBit);
+    friction = surface.fixed->friction, restitution = surface.fixed->restitution;
+  } else {
+    const BodyModel& b = *moving_[island_slot_[ends.b]].model;
+    surface.fixed = nullptr;
+    friction = b.friction, restitution = b.restitution;
+  }
+  surface.friction = std::sqrt(a.friction * friction);
+  surface.restitution = std::max(a.restitution, restitution);
+}
+
+// Each island's first contact, each one's second, and so on: neighbours in the list are of different islands, and can
+// be solved at once.
+void Stepper::mix_group() {
+  mixed_.clear();
+  unmixed_ = group_;
+  for (std::uint32_t k = 0; !unmixed_.empty(); ++k) {
+    std::erase_if(unmixed_, [k](const Grouped& one) { return k >= one.contacts; });
+    if (unmixed_.size() == 1) {
+      const auto left = std::span(sorted_).subspan(unmixed_[0].first_contact + k, unmixed_[0].contacts - k);
+      mixed_.insert(mixed_.end(), left.begin(), left.end());
+      return;
     }
-    if (!finite)  // nor are the impulses that came with it
-      for (const std::uint32_t c : touching) forget_impulses(contacts[c]);
-    if (quiet) {
-      ++counters.fell_asleep;
-      for (const std::uint32_t i : members) {
-        bodies[i].flags |= kAsleep;
-        bodies[i].set_v(Vec3::Zero());
-        bodies[i].set_w(Vec3::Zero());
-      }
+    for (const Grouped& one : unmixed_) mixed_.push_back(sorted_[one.first_contact + k]);
+  }
+}
+
+void Stepper::finish(std::span<BodyState> bodies, std::span<ContactRecord> contacts, const Islands& islands,
+                     const Grouped& one) {
+  const auto members = islands.bodies_of(one.island);
+  bool quiet = constants_.sleeping, finite = true;
+  for (std::uint32_t k = 0; k < members.size(); ++k) {
+    BodyState& state = bodies[members[k]];
+    MovingBody& body = moving_[one.first_body + k];
+    if (!end_step(body, constants_, state)) {
+      ++counters.non_finite;
+      finite = false;
     }
-    clock.lap(times.solve);
+    counters.clamped += body.clamped;
+    quiet = quiet && state.quiet_steps >= constants_.quiet_steps_to_sleep;
+  }
+  if (!finite)  // nor are the impulses that came with it
+    for (const std::uint32_t c : islands.contacts_of(one.island)) forget_impulses(contacts[c]);
+  if (!quiet) return;
+  ++counters.fell_asleep;
+  for (const std::uint32_t i : members) {
+    bodies[i].flags |= kAsleep;
+    bodies[i].set_v(Vec3::Zero());
+    bodies[i].set_w(Vec3::Zero());
   }
 }
 

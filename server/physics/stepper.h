@@ -63,6 +63,9 @@ class Stepper {
   // All three for a closed set.
   void step(BodySet& set);
 
+  // Another solver kernel than the machine's best, for comparisons; the bits are the same.
+  void use(const Kernel& kernel) { solver_.use(kernel); }
+
   // The reach boxes of the bodies last given to find_contacts.
   std::span<const Aabb> boxes() const { return boxes_; }
 
@@ -77,6 +80,13 @@ class Stepper {
   void contacts_of(std::span<const BodyState> bodies, std::uint32_t body, std::vector<ContactRecord>& out);
   Party party(const BodyState& state, std::uint32_t slot) const;
   Party party(const StaticModel& fixed) const;
+  struct Grouped {  // an island that is solved together with others
+    std::uint32_t island, first_body, first_contact, contacts;
+  };
+  void find_surface(const ContactRecord& contact, const Ends& ends, Surface& surface) const;
+  void mix_group();
+  void finish(std::span<BodyState> bodies, std::span<ContactRecord> contacts, const Islands& islands,
+              const Grouped& one);
   std::uint32_t slot_of(BodyId id) const;  // kStaticSlot where the id is not in the set
 
   const Model& model_;
@@ -101,8 +111,11 @@ class Stepper {
   std::vector<std::uint32_t> slots_in_use_;
   std::vector<Vec3> centres_;
   std::vector<Surface> surfaces_;
-  std::vector<std::uint32_t> island_slot_, all_, sorted_;
+  std::vector<std::uint32_t> island_slot_, all_;
+  std::vector<Grouped> group_, unmixed_;
+  std::vector<std::uint32_t> sorted_, mixed_;  // contacts of the group: by island, and as they are solved
   std::vector<MovingBody> moving_;
+  std::size_t moving_used_ = 0;
   // Scratch of step().
   std::vector<ContactRecord> found_;
   std::vector<Ends> ends_;

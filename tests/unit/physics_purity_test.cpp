@@ -52,6 +52,17 @@ class Purity : public testing::TestWithParam<Case> {
   Watch watch;
 };
 
+TEST_P(Purity, EveryInstructionSetGivesTheSameBits) {
+  const Kernels kernels = available_kernels();
+  if (kernels.count < 2) GTEST_SKIP() << "this machine has the baseline's instructions only";
+  for (int k = 0; k + 1 < kernels.count; ++k) {
+    Stepper other(model);
+    other.use(*kernels.list[k]);
+    reference.use(*kernels.list[kernels.count - 1]);
+    run_beside([&](BodySet& set) { other.step(set); });
+  }
+}
+
 TEST_P(Purity, DoesNotDependOnTheOrderInTheScene) {
   Scene scene = GetParam().make();
   Random random(5);

@@ -1,0 +1,87 @@
+// The inner loops of the island solver: the same code for each instruction set, four constraints at a time, one in each
+// lane. Arithmetic is that of IEEE 754 doubles in a fixed order, without fused operations, so that all sets give the
+// same bits; which one runs is chosen when the program does.
+//
+// Plain arrays, and no library below: what is compiled for a newer instruction set must not share a function with what
+// is not.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace soda::physics {
+
+constexpr int kLanes = 4;
+// One number of each of four constraints. Their alignment is said, because it must not depend on the instruction set that
+// a file is compiled for. Compilers without the instructions take two or four apart.
+using Lanes = double __attribute__((vector_size(kLanes * sizeof(double)), aligned(kLanes * sizeof(double))));
+struct Lanes3 {
+  Lanes x, y, z;
+};
+
+constexpr std::uint32_t kNoBody = 0xffffffffu;  // a static one, or of a lane that is not in use
+
+// What moves of a body while its island is solved, at the start of each body of the array that the kernels are given.
+struct alignas(32) Motion {
+  double v[4], w[4];           // m/s, rad/s; the fourth is 0 in all of them
+  double moved[4], turned[4];  // m, rad: since the start of the step
+};
+
+struct Row {              // one direction at one place
+  Lanes3 a_turn, b_turn;  // r x direction, for each body: the angular Jacobian
+  Lanes3 a_spin, b_spin;  // inverse inertia times that: change of angular velocity per unit of impulse
+};
+
+struct BatchPoint {
+  Row row;
+  Lanes mass;        // effective mass along the normal, kg; 0: there is no such point
+  Lanes separation;  // m, at the start of the step
+  Lanes impulse;     // N s, accumulated, of this sub-step
+  Lanes most;        // N s, the largest impulse of the step: whether the point ever pushed
+  Lanes approach;    // m/s, normal velocity before the step
+  Lanes arm;         // m, from the friction centre, for the twist limit
+};
+
+// Up to four contacts that share no moving body. Lanes that are not in use are all zero, and stay so.
+struct Batch {
+  std::uint32_t a[kLanes], b[kLanes];    // bodies, or kNoBody
+  std::uint32_t record[kLanes];          // kNoBody: the lane is not in use
+  std::uint32_t count[kLanes];           // of points
+  std::uint32_t points;                  // the largest of these
+  bool bounces;                          // some restitution is not 0
+  Lanes inverse_mass_a, inverse_mass_b;  // 1/kg
+  Lanes friction, restitution;
+  Lanes bias_rate, mass_scale, impulse_scale;  // of soft contacts
+  Lanes3 normal, tangent[2];
+  BatchPoint point[4];
+  Row slide[2];
+  Lanes k00, k01, k11;  // inverse of the 2 x 2 effective-mass matrix of the tangents, kg
+  Lanes slide_impulse[2];
+  Lanes3 a_twist, b_twist;  // inverse inertia times the normal
+  Lanes twist_mass, twist_impulse;
+};
+
+struct Bodies {
+  std::byte* first;    // a Motion
+  std::size_t stride;  // bytes from one to the next
+};
+
+struct Kernel {
+  const char* name;
+  void (*warm_start)(const Batch* batches, std::size_t count, Bodies bodies);
+  // One pass over all constraints, in order. `bias`: push out what overlaps.
+  void (*pass)(Batch* batches, std::size_t count, Bodies bodies, double inverse_h, bool bias);
+};
+
+// The best that this machine has; or what the environment's SODA_SIMD names (baseline, avx2), for comparisons. Throws
+// std::runtime_error where it names something else, or what this machine lacks.
+const Kernel& chosen_kernel();
+
+// Those that this machine has, the baseline first.
+struct Kernels {
+  const Kernel* list[2];
+  int count;
+};
+Kernels available_kernels();
+
+}  // namespace soda::physics
