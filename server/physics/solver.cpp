@@ -6,6 +6,8 @@
 #include <cstring>
 
 #include "server/physics/contact_update.h"
+#include "server/physics/impacts.h"
+#include "server/physics/lanes.h"
 #include "server/physics/tuning.h"
 
 namespace soda::physics {
@@ -18,14 +20,6 @@ double inverse_or_zero(double x) { return x > 0 ? 1 / x : 0; }
 // How much each point weighs in the place where friction acts: what it carried last, or, in a new contact, the same for
 // all that touch.
 constexpr double kTouching = 0.005;  // m
-
-void put(Lanes3& to, int lane, const Vec3& v) {
-  to.x[lane] = v.x();
-  to.y[lane] = v.y();
-  to.z[lane] = v.z();
-}
-
-Vec3 get(const Lanes3& from, int lane) { return Vec3(from.x[lane], from.y[lane], from.z[lane]); }
 
 static_assert(offsetof(MovingBody, v) == offsetof(Motion, v) && offsetof(MovingBody, w) == offsetof(Motion, w) &&
               offsetof(MovingBody, moved) == offsetof(Motion, moved) &&
@@ -125,8 +119,6 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
     p.separation[lane] = separations[k];
     p.mass[lane] = inverse_or_zero(linear + inverse_mass_of(row, row));
     p.impulse[lane] = impulses[k];
-    p.approach[lane] = normal.dot((b ? b->v : Vec3(Vec3::Zero())) - a.v) - row.a_turn.dot(a.w) +
-                       (b ? row.b_turn.dot(b->w) : 0.0);
   }
 
   Vec3 centre_a = Vec3::Zero(), centre_b = Vec3::Zero();
@@ -139,6 +131,11 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
   }
   centre_a /= weight;
   centre_b /= weight;
+  // Friction acts half way across the gap.
+  const Vec3 gap = (0.5 * normal.dot(b_minus_a + centre_b - centre_a)) * normal;
+  centre_a += gap;
+  centre_b -= gap;
+  if (b) put(batch.mismatch, lane, b_minus_a + centre_b - centre_a);
   for (std::uint32_t k = 0; k < record.count; ++k) {
     const Vec3 arm = ra[k] - centre_a;
     batch.point[k].arm[lane] = (arm - normal.dot(arm) * normal).norm();
@@ -166,30 +163,15 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
   batch.twist_impulse[lane] = record.twist;
 }
 
-void IslandSolver::restitution(std::span<MovingBody> bodies) {
+void IslandSolver::settle_torques(std::span<MovingBody> bodies) const {
   for (std::size_t i = 0; i < used_; ++i) {
-    Batch& batch = batches_[i];
-    if (!batch.bounces) continue;
+    const Batch& batch = batches_[i];
     for (int l = 0; l < kLanes; ++l) {
-      if (batch.restitution[l] <= 0) continue;
-      MovingBody& a = bodies[batch.a[l]];
-      MovingBody* const b = batch.b[l] == kNoBody ? nullptr : &bodies[batch.b[l]];
-      const Vec3 normal = get(batch.normal, l);
-      for (std::uint32_t k = 0; k < batch.count[l]; ++k) {
-        BatchPoint& p = batch.point[k];
-        const double approach = p.approach[l];
-        if (approach > -kRestitutionThreshold || p.most[l] == 0) continue;
-        const double vn = normal.dot((b ? b->v : Vec3(Vec3::Zero())) - a.v) - get(p.row.a_turn, l).dot(a.w) +
-                          (b ? get(p.row.b_turn, l).dot(b->w) : 0.0);
-        const double sum = std::max(p.impulse[l] - p.mass[l] * (vn + batch.restitution[l] * approach), 0.0);
-        const double impulse = sum - p.impulse[l];
-        p.impulse[l] = sum;
-        a.v -= (batch.inverse_mass_a[l] * impulse) * normal;
-        a.w -= impulse * get(p.row.a_spin, l);
-        if (!b) continue;
-        b->v += (batch.inverse_mass_b[l] * impulse) * normal;
-        b->w += impulse * get(p.row.b_spin, l);
-      }
+      if (batch.b[l] == kNoBody) continue;
+      const Vec3 half = 0.5 * get(batch.owed, l);
+      MovingBody &a = bodies[batch.a[l]], &b = bodies[batch.b[l]];
+      a.w -= a.inverse_inertia * half;
+      b.w -= b.inverse_inertia * half;
     }
   }
 }
@@ -221,14 +203,18 @@ void IslandSolver::solve(std::span<MovingBody> bodies, std::span<const std::uint
     prepare(bodies, a, b, surfaces[index], records[index], *batch, lane);
   }
   const Bodies moving{reinterpret_cast<std::byte*>(bodies.data()), sizeof(MovingBody)};
+  const bool bounces = std::any_of(batches_.begin(), batches_.begin() + static_cast<std::ptrdiff_t>(used_),
+                                   [](const Batch& batch) { return batch.bounces; });
+  const double gravity = constants_.gravity.norm();
   for (std::uint32_t i = 0; i < constants_.substeps; ++i) {
+    if (bounces) strike(std::span(batches_).first(used_), bodies, constants_.h, gravity);
     for (MovingBody& body : bodies) accelerate(body, constants_.h, constants_);
     kernel_->warm_start(batches_.data(), used_, moving);
     kernel_->pass(batches_.data(), used_, moving, 1 / constants_.h, true);
     for (MovingBody& body : bodies) move(body, constants_.h, constants_);
     kernel_->pass(batches_.data(), used_, moving, 1 / constants_.h, false);
   }
-  restitution(bodies);
+  settle_torques(bodies);
   store(records);
 }
 

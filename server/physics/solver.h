@@ -47,7 +47,8 @@ class IslandSolver {
   std::pair<Batch*, int> lane_for(std::uint32_t a, std::uint32_t b);
   void prepare(std::span<const MovingBody> bodies, std::uint32_t a, std::uint32_t b, const Surface& surface,
                const ContactRecord& record, Batch& batch, int lane) const;
-  void restitution(std::span<MovingBody> bodies);
+  // Pays what the contacts' places owe in angular momentum: see Batch::owed.
+  void settle_torques(std::span<MovingBody> bodies) const;
   void store(std::span<ContactRecord> records) const;
   Softness softness(bool with_static) const;
 

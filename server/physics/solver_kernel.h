@@ -37,8 +37,6 @@ struct BatchPoint {
   Lanes mass;        // effective mass along the normal, kg; 0: there is no such point
   Lanes separation;  // m, at the start of the step
   Lanes impulse;     // N s, accumulated, of this sub-step
-  Lanes most;        // N s, the largest impulse of the step: whether the point ever pushed
-  Lanes approach;    // m/s, normal velocity before the step
   Lanes arm;         // m, from the friction centre, for the twist limit
 };
 
@@ -59,6 +57,10 @@ struct Batch {
   Lanes slide_impulse[2];
   Lanes3 a_twist, b_twist;  // inverse inertia times the normal
   Lanes twist_mass, twist_impulse;
+  Lanes3 mismatch;          // m, from a's place of contact to b's, at the start of the step
+  // N m s: what is pushed in one place of a and in another of b, because they have moved against each other since the
+  // start of the step, makes a torque that both owe.
+  Lanes3 owed;
 };
 
 struct Bodies {

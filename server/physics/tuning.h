@@ -27,6 +27,8 @@ constexpr double kStaticHertzFactor = 2;      // contacts with static bodies are
 constexpr double kStaticDampingFactor = 0.5;  // ... and less damped
 constexpr double kPushOutSpeed = 3;           // m/s, limit for removing penetration
 constexpr double kRestitutionThreshold = 1;   // m/s; slower approaches do not bounce
+constexpr int kImpactIterations = 16;         // over the points of one manifold
+constexpr int kMostImpactRounds = 64;         // over an island, in one sub-step; what strikes later is stopped
 
 // ---- integration
 constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning is taken as free of gyroscopic torque

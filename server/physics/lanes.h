@@ -1,0 +1,17 @@
+// Single lanes of the solver's data, as vectors of Eigen's. Not for the kernels.
+#pragma once
+
+#include "common/math.h"
+#include "server/physics/solver_kernel.h"
+
+namespace soda::physics {
+
+inline Vec3 get(const Lanes3& from, int lane) { return Vec3(from.x[lane], from.y[lane], from.z[lane]); }
+
+inline void put(Lanes3& to, int lane, const Vec3& v) {
+  to.x[lane] = v.x();
+  to.y[lane] = v.y();
+  to.z[lane] = v.z();
+}
+
+}  // namespace soda::physics
