@@ -93,7 +93,7 @@ bool strike(const Batch& batch, int lane, std::span<MovingBody> bodies, double h
   for (std::uint32_t k = 0; k < batch.count[lane]; ++k) {
     line[count] = pair.line(batch.point[k].row, lane, normal);
     const double u = pair.speed(line[count]);
-    const double reach = (gravity * h - std::min(u, 0.0)) * h;
+    const double reach = kImpactReach * (gravity * h - std::min(u, 0.0)) * h;
     if (pair.separation(batch.point[k], lane, normal) > reach) continue;  // will not touch within the sub-step
     strikes = strikes || u < -kRestitutionThreshold;
     before[count] = u;

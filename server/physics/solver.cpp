@@ -135,7 +135,11 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
   const Vec3 gap = (0.5 * normal.dot(b_minus_a + centre_b - centre_a)) * normal;
   centre_a += gap;
   centre_b -= gap;
-  if (b) put(batch.mismatch, lane, b_minus_a + centre_b - centre_a);
+  // Bodies at rest on each other keep their frozen places as if they were one: that is what holds tall stacks up.
+  if (b) {
+    const Vec3 slip = b->v + b->w.cross(centre_b) - a.v - a.w.cross(centre_a);
+    if (slip.squaredNorm() > kMovingSpeed * kMovingSpeed) put(batch.mismatch, lane, b_minus_a + centre_b - centre_a);
+  }
   for (std::uint32_t k = 0; k < record.count; ++k) {
     const Vec3 arm = ra[k] - centre_a;
     batch.point[k].arm[lane] = (arm - normal.dot(arm) * normal).norm();
