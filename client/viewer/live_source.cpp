@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kPatience = 1s;  // for news of how a body looks
+constexpr auto kShapePatience = 1s;  // for news of how a body looks
 
 double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
@@ -45,7 +45,7 @@ News LiveSource::poll() {
     const buffer::BodyIndex& heard = client_.buffer()->bodies();
     const auto now = Clock::now();
     if (bodies_.size() == heard.size() || model_->has(heard.id(listed()))) stuck_ = now;
-    while (bodies_.size() < heard.size() && (model_->has(heard.id(listed())) || now - stuck_ > kPatience))
+    while (bodies_.size() < heard.size() && (model_->has(heard.id(listed())) || now - stuck_ > kShapePatience))
       bodies_.push_back(heard.id(listed()));
     watch_worlds(news);
   }

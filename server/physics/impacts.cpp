@@ -19,14 +19,13 @@ class Pair {
   Pair(const Batch& batch, int lane, std::span<MovingBody> bodies)
       : a_(bodies[batch.a[lane]]),
         b_(batch.b[lane] == kNoBody ? nullptr : &bodies[batch.b[lane]]),
-        moved_(b_ ? Vec3(b_->moved - a_.moved) : Vec3(-a_.moved)),
-        apart_(b_ ? Vec3(get(batch.mismatch, lane) + moved_) : Vec3(Vec3::Zero())) {}
+        moved_(b_ ? Vec3(b_->moved - a_.moved) : Vec3(-a_.moved)) {}
 
   // With both bodies' arms to one place, half way between theirs.
   Line line(const Row& row, int lane, const Vec3& direction) const {
     Line line{direction, get(row.a_turn, lane), get(row.b_turn, lane), get(row.a_spin, lane), get(row.b_spin, lane)};
     if (!b_) return line;
-    const Vec3 shift = 0.5 * apart_.cross(direction);
+    const Vec3 shift = 0.5 * moved_.cross(direction);
     line.a_turn += shift;
     line.b_turn -= shift;
     line.a_spin += a_.inverse_inertia * shift;
@@ -57,7 +56,7 @@ class Pair {
  private:
   MovingBody& a_;
   MovingBody* const b_;
-  const Vec3 moved_, apart_;  // m: since the start of the step; of the two bodies' places of contact
+  const Vec3 moved_;  // m, of b against a since the start of the step
 };
 
 // How much of an impulse may be applied so that its work is not positive: with impulse s p it is s b + s^2 (w - b).

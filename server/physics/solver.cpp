@@ -105,6 +105,17 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
     return l.a_turn.dot(r.a_spin) + (b ? l.b_turn.dot(r.b_spin) : 0.0);
   };
 
+  // Bodies at rest on each other keep their frozen places, as if they were one: that is what holds tall stacks up. Others
+  // are pushed in one place, half way between: angular momentum is kept.
+  Vec3 shift = Vec3::Zero();
+  if (b) {
+    const Vec3 slip =
+        b->v + b->w.cross(vec(record.points[0].arm_b)) - a.v - a.w.cross(vec(record.points[0].arm_a));
+    if (slip.squaredNorm() > kMovingSpeed * kMovingSpeed) {
+      shift = 0.5 * (b_minus_a - vec(record.offset));
+      shift -= normal.dot(shift) * normal;
+    }
+  }
   Vec3 ra[kMaxContactPoints], rb[kMaxContactPoints];
   double impulses[kMaxContactPoints], separations[kMaxContactPoints], carried = 0;
   for (std::uint32_t k = 0; k < record.count; ++k) {
@@ -115,6 +126,8 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
     separations[k] = normal.dot(b_minus_a + turn_b * rb[k] - turn_a * ra[k]);
     impulses[k] = record.points[k].impulse;
     carried += impulses[k];
+    ra[k] += shift;
+    rb[k] -= shift;
     const Made row = make_row(ra[k], rb[k], normal, p.row);
     p.separation[lane] = separations[k];
     p.mass[lane] = inverse_or_zero(linear + inverse_mass_of(row, row));
@@ -135,11 +148,6 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
   const Vec3 gap = (0.5 * normal.dot(b_minus_a + centre_b - centre_a)) * normal;
   centre_a += gap;
   centre_b -= gap;
-  // Bodies at rest on each other keep their frozen places as if they were one: that is what holds tall stacks up.
-  if (b) {
-    const Vec3 slip = b->v + b->w.cross(centre_b) - a.v - a.w.cross(centre_a);
-    if (slip.squaredNorm() > kMovingSpeed * kMovingSpeed) put(batch.mismatch, lane, b_minus_a + centre_b - centre_a);
-  }
   for (std::uint32_t k = 0; k < record.count; ++k) {
     const Vec3 arm = ra[k] - centre_a;
     batch.point[k].arm[lane] = (arm - normal.dot(arm) * normal).norm();

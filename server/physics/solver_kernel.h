@@ -57,9 +57,8 @@ struct Batch {
   Lanes slide_impulse[2];
   Lanes3 a_twist, b_twist;  // inverse inertia times the normal
   Lanes twist_mass, twist_impulse;
-  // m, from a's place of contact to b's, at the start of the step; 0 of bodies at rest against each other. What is pushed
-  // in one place of a and in another of b makes a torque, N m s, that both owe.
-  Lanes3 mismatch;
+  // N m s: places of contact move apart within the step; what is pushed in one place of a and in another of b makes a
+  // torque, which both owe.
   Lanes3 owed;
 };
 

@@ -14,7 +14,7 @@ namespace {
 constexpr std::chrono::milliseconds kTick{5};  // of a paced run: finer than a frame of any display
 constexpr double kTellAgain = 0.5;             // s that a world may lack entries of the log that were told
 constexpr std::size_t kTellAtOnce = 256;       // of those, again
-constexpr double kLogEvery = 5;                // s, while worlds are missing
+constexpr double kLogMissingEvery = 5;                // s, while worlds are missing
 constexpr double kJoining = 60;                // s that a daemon may take to load the scene and say so
 constexpr double kGone = 120;                  // s of silence after which a running world will not come back
 constexpr double kPause = 2;                   // s between two looks at the clock: this process stood still
@@ -33,7 +33,7 @@ SessionService::SessionService(const wire::Session& session, std::shared_ptr<con
       seats_(session.worlds()),
       pacer_(session.pace() / session.dt(), session.window(), session.lead(), session.last_step()),
       desk_(session.instance(), std::move(scene), std::move(actions)),
-      next_log_(seconds_now() + kLogEvery),
+      next_log_(seconds_now() + kLogMissingEvery),
       looked_(seconds_now()) {
   seats_[0].nonce = session.instance();
   seats_[0].holder = "this process";
@@ -209,7 +209,7 @@ bool SessionService::ended() const {
 
 void SessionService::log_missing(double now) {
   if (now < next_log_) return;
-  next_log_ = now + kLogEvery;
+  next_log_ = now + kLogMissingEvery;
   std::string missing, unready;
   for (std::size_t i = 0; i < seats_.size(); ++i) {
     if (seats_[i].nonce == 0)
