@@ -12,6 +12,7 @@
 
 #include "common/ids.h"
 #include "common/math.h"
+#include "common/scene/joint.h"
 
 namespace soda {
 
@@ -83,6 +84,7 @@ struct Body {
   double restitution = 0;                // 0 .. 1; of a pair: the larger
   double linear_damping = 0, angular_damping = 0;  // 1/s
   std::optional<Drive> drive;                      // dynamic bodies only
+  double joint_reach = 0;  // m, about the centre of mass, within which its joints act; filled in from them
   std::uint32_t colour = 0xb0b0b0ff;               // RGBA, for display
 };
 
@@ -95,7 +97,8 @@ struct Scene {
   double max_speed = 100;            // m/s; faster bodies are clamped, counted and reported
   double territory_cell = 0;         // m, edge of a territory cell; 0: chosen from the bodies (grid.h)
   std::vector<Geometry> geometries;
-  std::vector<Body> bodies;  // ascending by id
+  std::vector<Body> bodies;   // ascending by id
+  std::vector<Joint> joints;  // ascending by a, then b; no joint names a body that is not there
 };
 
 }  // namespace soda

@@ -1,0 +1,66 @@
+// Joints as the simulation uses them: what keeps two bodies, or a body and the world, together.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/ids.h"
+#include "common/math.h"
+
+namespace soda {
+
+struct Scene;
+
+enum class JointKind : std::uint8_t {
+  kFixed,     // frames stay one
+  kBall,      // origins stay one
+  kHinge,     // origins and z axes stay one
+  kSlider,    // axes stay parallel, b's origin on a's x axis
+  kDistance,  // origins stay within limits of each other
+};
+
+struct JointLimits {
+  double lower = 0, upper = 0;  // rad or m
+};
+struct JointMotor {
+  double target_velocity = 0;  // rad/s or m/s
+  double max_effort = 0;       // N m or N
+};
+struct JointSpring {
+  double frequency = 0;      // Hz
+  double damping_ratio = 0;  // 1 is critical
+};
+
+// The angle of a hinge is that of frame b against frame a about their z axis; the travel of a slider that of frame b's
+// origin along frame a's x axis.
+struct Joint {
+  std::string name;  // may be empty; for messages
+  JointKind kind = JointKind::kFixed;
+  BodyId a = 0;  // a dynamic body
+  BodyId b = 0;  // a dynamic body with a higher id, a static one, or 0: the world
+  Pose frame_a, frame_b;  // in the bodies' frames
+  // Hinge: rad. Slider, distance: m, always given (equal ones are a rod). Ball: the twist about z, rad.
+  std::optional<JointLimits> limits;
+  std::optional<double> cone_limit;  // ball: rad, between the frames' z axes
+  std::optional<JointMotor> motor;   // hinge, slider, distance
+  // Fixed, ball: holds softly instead of rigidly. Hinge, slider, distance: pulls towards the middle of the limits, or 0
+  // where there are none.
+  std::optional<JointSpring> spring;
+  bool bodies_collide = false;  // with each other
+};
+
+// How far apart two places that a joint keeps together may come, m, beyond what its limits allow: worlds look for a
+// joint's other body no further away. A joint that is torn further does nothing until its bodies are near again.
+double joint_slack(const Scene& scene, const Joint& joint);
+
+// Of each end: the sphere about its place, radius in m, within which the other end's place is looked for.
+double joint_reach_a(const Scene& scene, const Joint& joint);
+double joint_reach_b(const Scene& scene, const Joint& joint);
+
+// Orders the scene's joints (by a, then b, else as they were), and gives Body::joint_reach its value. For whoever makes
+// scenes; the bodies are there already, ascending by id.
+void finish_joints(Scene& scene);
+
+}  // namespace soda
