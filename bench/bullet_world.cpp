@@ -64,7 +64,10 @@ struct BulletWorld::World {
   std::vector<Driven> driven;
   std::vector<std::size_t> dynamic;  // positions in `bodies`
 
+  std::vector<std::unique_ptr<btTypedConstraint>> joints;
+
   ~World() {
+    for (auto& joint : joints) dynamics.removeConstraint(joint.get());
     for (auto& body : bodies) dynamics.removeRigidBody(body.get());
   }
 
@@ -106,6 +109,35 @@ struct BulletWorld::World {
     dynamics.addRigidBody(&made);
   }
 
+  void add(const Joint& joint) {
+    // b is a body, or null for the world; frames about the centres of mass.
+    const auto end = [&](BodyId id, const Pose& frame) -> std::pair<btRigidBody*, btTransform> {
+      for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (scene.bodies[i].id == id)
+          return {bodies[i].get(), to_bullet(Pose{frame.position - scene.bodies[i].inertial.centre, frame.orientation})};
+      return {nullptr, to_bullet(frame)};
+    };
+    const auto [a, in_a] = end(joint.a, joint.frame_a);
+    const auto [b, in_b] = end(joint.b, joint.frame_b);
+    // A rod to the world is the nearest thing that Bullet has: a ball joint at its far end.
+    if (joint.kind == JointKind::kDistance && !b && joint.limits->lower == joint.limits->upper) {
+      const btVector3 pivot = a->getWorldTransform().inverse() * in_b.getOrigin();
+      joints.push_back(std::make_unique<btPoint2PointConstraint>(*a, pivot));
+      dynamics.addConstraint(joints.back().get());
+      return;
+    }
+    if (joint.limits || joint.motor || joint.spring || joint.cone_limit)
+      throw std::invalid_argument("stock Bullet: limits, motors and springs are not compared");
+    btRigidBody& other = b ? *b : btTypedConstraint::getFixedBody();
+    if (joint.kind == JointKind::kBall)
+      joints.push_back(std::make_unique<btPoint2PointConstraint>(*a, other, in_a.getOrigin(), in_b.getOrigin()));
+    else if (joint.kind == JointKind::kHinge)
+      joints.push_back(std::make_unique<btHingeConstraint>(*a, other, in_a, in_b));
+    else
+      throw std::invalid_argument("stock Bullet: only ball joints and hinges are compared");
+    dynamics.addConstraint(joints.back().get(), !joint.bodies_collide);
+  }
+
   // As in our integrator, once per step.
   void drive() {
     const Vec3 up = scene.gravity.isZero(0) ? Vec3(Vec3::Zero()) : Vec3(-scene.gravity.normalized());
@@ -132,6 +164,7 @@ BulletWorld::BulletWorld(const Scene& scene) : world_(std::make_unique<World>(sc
   }
   world_->dynamics.setGravity(to_bullet(scene.gravity));
   for (const Body& body : scene.bodies) world_->add(body, by_geometry);
+  for (const Joint& joint : scene.joints) world_->add(joint);
 }
 
 BulletWorld::~BulletWorld() = default;

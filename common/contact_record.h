@@ -1,5 +1,5 @@
 // The memory of a contact between two steps: where it was last detected and the impulses that it carried.
-// Plain memory, part of the state. A record without points does not exist.
+// Plain memory, part of the state. A record without points does not exist. Joints have records, too: what they carried.
 #pragma once
 
 #include <cstdint>
@@ -34,6 +34,12 @@ struct ContactRecord {
 
   bool with_static() const { return (b & kStaticBit) != 0; }
 };
+
+// ---- records of joints: `part` is this and the joint's number among those of the two bodies. One point holds impulses of
+// the last sub-step, arm_a the linear one on b, N s, arm_b the angular one, N m s, both in world axes; `impulse`,
+// `friction` and `twist` those of limits, motor and spring. Without normal and anchors.
+constexpr std::uint32_t kJointPart = 0xffffff00u;
+inline bool is_joint(const ContactRecord& record) { return record.part >= kJointPart; }
 
 static_assert(std::is_trivially_copyable_v<ContactRecord>, "sent and hashed as raw bytes");
 static_assert(sizeof(ContactRecord) == 392, "no padding: all bytes are meaningful");

@@ -48,6 +48,10 @@ double bounding_radius(const Scene& scene, const Body& body) {
   return radius;
 }
 
+double reach_radius(const Scene& scene, const Body& body) {
+  return std::max(bounding_radius(scene, body), body.joint_reach);
+}
+
 double largest_ordinary_radius(std::vector<double> radii) {
   constexpr double kWideRatio = 4;
   const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
@@ -74,7 +78,7 @@ Grid make_grid(const Scene& scene) {
   Vec3 low = Vec3::Constant(1e300), high = Vec3::Constant(-1e300);
   for (const Body& body : scene.bodies) {
     if (body.is_static) continue;
-    radii.push_back(bounding_radius(scene, body));
+    radii.push_back(reach_radius(scene, body));
     const Vec3 centre = body.pose.position + body.pose.orientation * body.inertial.centre;
     low = low.cwiseMin(centre);
     high = high.cwiseMax(centre);
@@ -115,7 +119,7 @@ constexpr double kMargin = 0.05;  // m
 int neighbour_range(const Scene& scene, const Grid& grid) {
   double radius = 0;
   for (const Body& body : scene.bodies)
-    if (!body.is_static) radius = std::max(radius, bounding_radius(scene, body));
+    if (!body.is_static) radius = std::max(radius, reach_radius(scene, body));
   const double reach = 2 * radius + scene.max_speed * scene.dt + kMargin;
   return std::max(2, static_cast<int>(std::ceil(reach / grid.edge + 0.5)) + 1);
 }

@@ -37,6 +37,8 @@ double largest_later_radius(const Scene& scene, const Grid& grid);
 
 // Radius of the sphere about a body's centre of mass that holds all its shapes, m.
 double bounding_radius(const Scene& scene, const Body& body);
+// The same, with what its joints reach for.
+double reach_radius(const Scene& scene, const Body& body);
 
 // Of the bounding radii of a scene's dynamic bodies (any order, not empty), the largest that is ordinary: at most four
 // times the median. The few larger bodies are "wide": cells and blocks for their sake would be too coarse.

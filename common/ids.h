@@ -13,6 +13,7 @@ constexpr WorldId kNoWorld = 0xffffffffu;
 
 // Ids stay below this bit, so that a contact record can name a static body in the same word (see contact_record.h).
 constexpr BodyId kStaticBit = BodyId{1} << 63;
+constexpr BodyId kWorldBody = 0;  // what a joint to the world names: no body
 constexpr BodyId kMaxBodyId = kStaticBit - 1;
 
 }  // namespace soda

@@ -48,6 +48,22 @@ void sin_cos(double angle, double& sine, double& cosine) {
   cosine = q == 0 ? c : q == 1 ? -s : q == 2 ? -c : s;
 }
 
+double angle_of(double sine, double cosine) {
+  constexpr double kPi = 3.14159265358979323846, kTanOfPiOver8 = 0.41421356237309503;
+  const double x = std::abs(cosine), y = std::abs(sine);
+  const double larger = x > y ? x : y, smaller = x > y ? y : x;
+  if (!(larger > 0)) return 0;
+  double t = smaller / larger, angle = 0;
+  if (t > kTanOfPiOver8) angle = kPi / 4, t = (t - 1) / (t + 1);
+  // atan t = t - t^3/3 + ...; the first term left out is below 1e-17 for |t| <= tan(pi/8).
+  double p = 0;
+  for (int k = 20; k >= 0; --k) p = p * (t * t) + (k % 2 ? -1.0 : 1.0) / (2 * k + 1);
+  angle += t * p;
+  if (y > x) angle = kPi / 2 - angle;
+  if (cosine < 0) angle = kPi - angle;
+  return sine < 0 ? -angle : angle;
+}
+
 Quat rotation_of(const Vec3& rotation_vector) {
   const double square = rotation_vector.squaredNorm();
   double scale, w;  // exp(v) = (w, scale * v)

@@ -100,5 +100,7 @@ std::vector<Case> stack_cases();     // A11, A12
 std::vector<Case> masonry_cases();   // A13, A14
 std::vector<Case> heap_cases();      // A18, A19
 std::vector<Case> far_cases();       // A20
+std::vector<Case> joint_cases();     // A3, A9, A10, A15
+std::vector<Case> all_cases();       // by number
 
 }  // namespace soda::bench

@@ -25,6 +25,7 @@ std::string ActionLog::body_problem(BodyId id, Step step) const {
   const auto at = std::lower_bound(scene_.bodies.begin(), scene_.bodies.end(), id,
                                    [](const Body& b, BodyId wanted) { return b.id < wanted; });
   if (at == scene_.bodies.end() || at->id != id) return "there is no " + name;
+  if (at->motion) return name + " follows a motion of its own";
   return at->is_static ? name + " is static" : "";
 }
 
@@ -45,6 +46,7 @@ std::string ActionLog::problem(const LoggedAction& entry) const {
                      [&](const Spawn& a) -> std::string {
                        if (next_id_ > kMaxBodyId) return "there is no id left for a new body";
                        const Body& body = a.body->bodies.front();
+                       if (body.motion) return "a body that follows a motion must be there from the start";
                        const double radius = bounding_radius(*a.body, body);
                        if (radius > largest_radius_)
                          return "its bounding radius is " + std::to_string(radius) + " m; in this scene it may be " +

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // To be raised whenever the same SDF gives another scene: it is part of every key.
-constexpr const char* kConverter = "soda sdf converter 1\n";
+constexpr const char* kConverter = "soda sdf converter 2\n";
 constexpr std::size_t kMaxEntries = 200;
 constexpr std::size_t kMaxUnpacked = std::size_t{4} << 30;  // bytes; what a damaged entry may make us allocate
 

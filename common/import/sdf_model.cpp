@@ -5,6 +5,7 @@
 #include <sdf/sdf.hh>
 
 #include "common/import/sdf_document.h"
+#include "common/import/sdf_pose.h"
 #include "common/scene/convex_hull.h"
 #include "common/scene/extent.h"
 #include "common/scene/validate.h"
@@ -13,28 +14,6 @@ namespace soda {
 namespace {
 
 constexpr double kSdfFriction = 1;  // SDF's default of <mu>
-
-Vec3 vec3_of(const ignition::math::Vector3d& v) { return Vec3(v.X(), v.Y(), v.Z()); }
-
-Pose pose_of(const ignition::math::Pose3d& p) {
-  Quat q(p.Rot().W(), p.Rot().X(), p.Rot().Y(), p.Rot().Z());
-  const double squared = q.squaredNorm();
-  // A quaternion of no length, or not a number, is left for the checks to name.
-  if (squared > 1e-12 && squared < 1e12 && !(std::abs(squared - 1) <= 1e-12)) q = normalized(q);
-  return {vec3_of(p.Pos()), q};
-}
-
-Pose compose(const Pose& a, const Pose& b) {
-  Pose c = a * b;
-  const double squared = c.orientation.squaredNorm();
-  if (squared > 1e-12 && !(std::abs(squared - 1) <= 1e-12)) c.orientation = normalized(c.orientation);
-  return c;
-}
-
-Pose inverse(const Pose& p) {
-  const Quat turn = p.orientation.conjugate();
-  return {turn * -p.position, turn};
-}
 
 // A child that the file really has.
 sdf::ElementPtr child(const sdf::ElementPtr& element, const char* name) {
@@ -78,6 +57,7 @@ ConvertedModel SdfModelConverter::convert(const sdf::Model& model, std::size_t u
   top_ = model.Name();
   uses_ = uses;
   bodies_.clear();
+  joints_.clear();
   ConvertedModel result;
   ignition::math::Pose3d in_world;
   for (const sdf::Error& e : model.SemanticPose().Resolve(in_world))
@@ -86,12 +66,14 @@ ConvertedModel SdfModelConverter::convert(const sdf::Model& model, std::size_t u
   if (!model.PlacementFrameName().empty())
     result.placement = compose(inverse(pose_of(model.SemanticPose().RawPose())), result.pose);
   add_model(model, "", Pose{}, false);
+  add_joints(model, "");
   for (const Body& body : bodies_) {
     if (body.is_static) continue;
     if (const auto box = extent_of(builder_.scene, body))
       result.radius = std::max(result.radius, box->min.cwiseAbs().cwiseMax(box->max.cwiseAbs()).norm());
   }
   result.bodies = std::move(bodies_);
+  result.joints = std::move(joints_);
   return result;
 }
 
@@ -105,10 +87,6 @@ void SdfModelConverter::note_file(const std::filesystem::path& file) {
 
 void SdfModelConverter::add_model(const sdf::Model& model, const std::string& scope, const Pose& pose, bool is_static) {
   const std::string place = top_ + (scope.empty() ? "" : "::" + scope.substr(0, scope.size() - 2));
-  if (model.JointCount() > 0)
-    fail("model \"" + place + "\"", "joint",
-         "joints are not simulated yet; this model has " + std::to_string(model.JointCount()) + ", the first is \"" +
-             model.JointByIndex(0)->Name() + "\"");
   is_static = is_static || model.Static();
   // In the order of the file.
   for (sdf::ElementPtr e = model.Element()->GetFirstElement(); e; e = e->GetNextElement()) {

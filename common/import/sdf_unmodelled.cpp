@@ -15,6 +15,10 @@ const std::map<std::string, std::vector<std::string>>& understood() {
       {"world", {"gravity", "physics", "frame", "model", "include", "population"}},
       {"physics", {"max_step_size"}},
       {"model", {"pose", "static", "frame", "link", "model", "include", "joint"}},
+      {"joint", {"pose", "parent", "child", "axis"}},
+      {"axis", {"xyz", "limit", "dynamics"}},
+      {"limit", {"lower", "upper"}},
+      {"dynamics", {}},
       {"link", {"pose", "inertial", "collision", "visual"}},
       {"inertial", {"pose", "mass", "inertia"}},
       {"collision", {"pose", "geometry", "surface"}},
@@ -36,6 +40,10 @@ bool is_harmless(sdf::Element& element, const std::string& parent) {
   if (name == "gravity" && parent == "link") return element.Get<bool>();
   for (const char* off : {"kinematic", "enable_wind", "must_be_base_link"})
     if (name == off) return !element.Get<bool>();
+  if (parent == "dynamics") return element.Get<double>() == 0;
+  // SDF's ways to say that there is no bound.
+  if (parent == "limit" && (name == "effort" || name == "velocity"))
+    return element.Get<double>() < 0 || element.Get<double>() >= 1e16;
   if (name == "allow_auto_disable") return element.Get<bool>();
   return false;
 }

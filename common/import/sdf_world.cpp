@@ -9,6 +9,7 @@
 #include "common/import/sdf_cache.h"
 #include "common/import/sdf_document.h"
 #include "common/import/sdf_model.h"
+#include "common/import/sdf_pose.h"
 #include "common/import/sdf_unmodelled.h"
 #include "common/scene/scene_file.h"
 
@@ -61,6 +62,8 @@ class WorldConverter {
     place_all();
     Scene& scene = builder_.scene;
     if (scene.bodies.empty()) throw SceneError(source_, "", "", "has no model with anything to collide");
+    for (Joint& joint : scene.joints) order_ends(scene, joint);
+    finish_joints(scene);
     validate(scene, source_);
     return std::move(scene);
   }
@@ -94,7 +97,8 @@ class WorldConverter {
     scene.gravity = Vec3(world.Gravity().X(), world.Gravity().Y(), world.Gravity().Z());
     if (const sdf::ElementPtr step = explicit_step(world)) scene.dt = step->Get<double>();
     if (world.Element()->HasElement("joint"))
-      throw SceneError(source_, "", "joint", "joints are not simulated yet; the world has one");
+      throw SceneError(source_, "", "joint",
+                       "joints of a <world> are not read: put this one into a <model> that holds both of its models");
     warn_of_unmodelled(*world.Element(), "", 1, warnings_);
     for (std::uint64_t m = 0; m < world.ModelCount(); ++m) {
       const sdf::Model& model = *world.ModelByIndex(m);
@@ -179,15 +183,22 @@ class WorldConverter {
   void place(const ConvertedModel& model, const std::string& name, const Pose& pose) {
     if (!names_.insert(name).second)
       throw SceneError(source_, "model \"" + name + "\"", "name", "is there twice", line_);
+    const BodyId before = builder_.scene.bodies.size();
     for (const Body& part : model.bodies) {
       Body body = part;
       body.id = builder_.scene.bodies.size() + 1;
       body.name = name + "::" + part.name;
-      body.pose = pose * part.pose;
-      const double squared = body.pose.orientation.squaredNorm();
-      if (squared > 1e-12 && !(std::abs(squared - 1) <= 1e-12))
-        body.pose.orientation = normalized(body.pose.orientation);
+      body.pose = compose(pose, part.pose);
       builder_.scene.bodies.push_back(std::move(body));
+    }
+    for (Joint joint : model.joints) {
+      joint.name = name + "::" + joint.name;
+      for (auto [end, frame] : {std::pair{&joint.a, &joint.frame_a}, std::pair{&joint.b, &joint.frame_b}})
+        if (*end == kWorldBody)
+          *frame = compose(pose, *frame);
+        else
+          *end += before;
+      builder_.scene.joints.push_back(std::move(joint));
     }
   }
 

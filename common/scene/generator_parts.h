@@ -11,6 +11,7 @@ namespace soda::generator {
 
 double add_piles(SceneBuilder& builder, Random& random, std::uint32_t count, const Vec3& middle);
 double add_towers(SceneBuilder& builder, std::uint32_t count, const Vec3& middle);
+double add_machines(SceneBuilder& builder, Random& random, std::uint32_t count, const Vec3& middle);
 double add_dominoes(SceneBuilder& builder, std::uint32_t count, const Vec3& middle);
 // `slabs` in stacks and `people` in the streets between them. (count = slabs + people)
 double add_city(SceneBuilder& builder, Random& random, std::uint32_t slabs, std::uint32_t people, const Vec3& middle);

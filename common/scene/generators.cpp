@@ -168,6 +168,10 @@ void dominoes(SceneBuilder& builder, Random&, std::uint32_t count) {
   builder.add_ground(ground_edge(add_dominoes(builder, count, Vec3::Zero())), 1);
 }
 
+void machines(SceneBuilder& builder, Random& random, std::uint32_t count) {
+  builder.add_ground(ground_edge(add_machines(builder, random, count, Vec3::Zero())));
+}
+
 // A little of everything, side by side: a city in the middle, piles to its left, dominoes to its right.
 void demo(SceneBuilder& builder, Random& random, std::uint32_t count) {
   const std::uint32_t in_piles = count / 5, in_rows = count / 5, slabs = 7 * count / 20;
@@ -197,6 +201,7 @@ constexpr Entry kEntries[] = {
     {{"city", "half in stacks of 20 mixed slabs, half a driven crowd in the streets between them"}, city},
     {{"dominoes", "rows of up to 200 dominoes, the first of each pushed"}, dominoes},
     {{"cluster", "eight bunches of boxes that meet in zero gravity"}, cluster},
+    {{"machines", "driven cars, swinging chains, presses, doors and turning arms among loose boxes"}, machines},
     {{"demo", "a small city, piles and dominoes side by side"}, demo},
 };
 

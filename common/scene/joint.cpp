@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <tuple>
+#include <utility>
 
 #include "common/grid.h"
 #include "common/scene/scene.h"
@@ -10,7 +12,7 @@
 namespace soda {
 namespace {
 
-constexpr double kSlackShare = 0.5;  // of the smaller body's bounding radius
+constexpr double kSlackShare = 0.5;   // of the smaller body's bounding radius
 constexpr double kLeastSlack = 0.02;  // m
 
 Body* find(Scene& scene, BodyId id) {
@@ -24,7 +26,54 @@ double radius_of(const Scene& scene, BodyId id) {
   return body && !body->is_static ? bounding_radius(scene, *body) : HUGE_VAL;
 }
 
+bool is_dynamic(const Scene& scene, BodyId id) {
+  const Body* const body = find(const_cast<Scene&>(scene), id);
+  return body && !body->is_static;
+}
+
+// The shortest turn that takes z, or x, to a unit vector. From IEEE operations only: generated scenes are to have the
+// same bits everywhere.
+Quat turn_to(bool from_x, Vec3 axis) {
+  // Of an axis that points back, the nearer end of its line is turned to, after half a turn about y: exact either way.
+  const bool back = (from_x ? axis.x() : axis.z()) < 0;
+  if (back) axis = -axis;
+  const Quat turn =
+      from_x ? Quat(1 + axis.x(), 0, 0 - axis.z(), axis.y()) : Quat(1 + axis.z(), 0 - axis.y(), axis.x(), 0);
+  return back ? normalized(turn) * Quat(0, 0, 1, 0) : normalized(turn);
+}
+
+// As long as a unit quaternion may be for a scene's reader to keep its bits.
+Quat kept_unit(const Quat& q) { return std::abs(q.squaredNorm() - 1) <= 1e-12 ? q : normalized(q); }
+
 }  // namespace
+
+const char* name_of(JointKind kind) {
+  static const char* const names[] = {"fixed", "ball", "hinge", "slider", "distance"};
+  const auto index = static_cast<std::size_t>(kind);
+  return index < std::size(names) ? names[index] : "kind";
+}
+
+Pose joint_frame(JointKind kind, const Vec3& at, const Vec3& axis) {
+  return {at, turn_to(kind == JointKind::kSlider, axis / std::sqrt(axis.squaredNorm()))};
+}
+
+Pose frame_in(const Pose& pose, const Pose& frame) {
+  const Quat back = pose.orientation.conjugate();
+  return {back * (frame.position - pose.position), kept_unit(back * frame.orientation)};
+}
+
+void turn_round(Joint& joint) {
+  std::swap(joint.a, joint.b);
+  std::swap(joint.frame_a, joint.frame_b);
+  if (joint.kind == JointKind::kDistance) return;
+  // 0 - x, so that 0 stays 0 and not -0.
+  if (joint.limits) joint.limits = JointLimits{0 - joint.limits->upper, 0 - joint.limits->lower};
+  if (joint.motor) joint.motor->target_velocity = 0 - joint.motor->target_velocity;
+}
+
+void order_ends(const Scene& scene, Joint& joint) {
+  if (is_dynamic(scene, joint.b) && (!is_dynamic(scene, joint.a) || joint.a > joint.b)) turn_round(joint);
+}
 
 double joint_slack(const Scene& scene, const Joint& joint) {
   return std::max(kLeastSlack, kSlackShare * std::min(radius_of(scene, joint.a), radius_of(scene, joint.b)));
@@ -40,9 +89,8 @@ double joint_reach_a(const Scene& scene, const Joint& joint) {
 double joint_reach_b(const Scene& scene, const Joint& joint) { return joint_slack(scene, joint); }
 
 void finish_joints(Scene& scene) {
-  std::stable_sort(scene.joints.begin(), scene.joints.end(), [](const Joint& l, const Joint& r) {
-    return std::tie(l.a, l.b) < std::tie(r.a, r.b);
-  });
+  std::stable_sort(scene.joints.begin(), scene.joints.end(),
+                   [](const Joint& l, const Joint& r) { return std::tie(l.a, l.b) < std::tie(r.a, r.b); });
   for (Body& body : scene.bodies) body.joint_reach = 0;
   for (const Joint& joint : scene.joints) {
     Body* const a = find(scene, joint.a);

@@ -38,8 +38,8 @@ struct JointSpring {
 struct Joint {
   std::string name;  // may be empty; for messages
   JointKind kind = JointKind::kFixed;
-  BodyId a = 0;  // a dynamic body
-  BodyId b = 0;  // a dynamic body with a higher id, a static one, or 0: the world
+  BodyId a = 0;           // a dynamic body
+  BodyId b = 0;           // a dynamic body with a higher id, a static one, or 0: the world
   Pose frame_a, frame_b;  // in the bodies' frames
   // Hinge: rad. Slider, distance: m, always given (equal ones are a rod). Ball: the twist about z, rad.
   std::optional<JointLimits> limits;
@@ -50,6 +50,19 @@ struct Joint {
   std::optional<JointSpring> spring;
   bool bodies_collide = false;  // with each other
 };
+
+const char* name_of(JointKind kind);  // as idl/scene.proto spells it
+
+// The frame of a joint of that kind at a place, its axis (z; of a slider x) along `axis`, which must not be zero.
+Pose joint_frame(JointKind kind, const Vec3& at, const Vec3& axis);
+// The same frame, given in the world, in that of a body at `pose`.
+Pose frame_in(const Pose& pose, const Pose& frame);
+
+// The same joint with its ends changed over: what it measures, where it has a sign, has the other one.
+void turn_round(Joint& joint);
+// Turns a joint round where it needs it: a is dynamic, and b dynamic with a higher id, or neither. For whoever makes
+// scenes; the bodies are there already, ascending by id. What cannot be put right is left for the checks.
+void order_ends(const Scene& scene, Joint& joint);
 
 // How far apart two places that a joint keeps together may come, m, beyond what its limits allow: worlds look for a
 // joint's other body no further away. A joint that is torn further does nothing until its bodies are near again.

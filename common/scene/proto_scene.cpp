@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <numeric>
+#include <tuple>
 #include <unordered_map>
 #include <unordered_set>
 
 #include "common/scene/mass_properties.h"
 #include "common/scene/proto_geometry.h"
+#include "common/scene/proto_joint.h"
 
 namespace soda {
 namespace {
@@ -31,6 +33,25 @@ Drive read_drive(const pb::Drive& message) {
                         read_vec3(message.bounds().max(), "drive.bounds.max")};
   }
   return drive;
+}
+
+PrescribedMotion read_motion(const pb::PrescribedMotion& message) {
+  refuse_unknown(message, "motion");
+  PrescribedMotion motion;
+  motion.velocity = read_vec3(message.velocity(), "motion.velocity");
+  motion.amplitude = read_vec3(message.amplitude(), "motion.amplitude");
+  motion.frequency = message.frequency();
+  motion.phase = message.phase();
+  motion.angular_velocity = read_vec3(message.angular_velocity(), "motion.angular_velocity");
+  return motion;
+}
+
+void write_motion(const PrescribedMotion& motion, pb::PrescribedMotion* message) {
+  write_vec3(motion.velocity, message->mutable_velocity());
+  write_vec3(motion.amplitude, message->mutable_amplitude());
+  message->set_frequency(motion.frequency);
+  message->set_phase(motion.phase);
+  write_vec3(motion.angular_velocity, message->mutable_angular_velocity());
 }
 
 // Whether to write a value at all: all-zero bits are what a missing field reads as (-0.0 is not).
@@ -67,7 +88,14 @@ class SceneReader {
       }
       scene_.bodies.push_back(std::move(body));
     }
-    sort_and_validate();
+    const std::vector<std::size_t> bodies = sort_bodies();
+    const std::vector<std::size_t> joints = read_joints();
+    try {
+      validate(scene_, source_, joints);
+    } catch (SceneError& e) {
+      if (e.body_index != SceneError::kNoBody) e.body_index = bodies[e.body_index];
+      throw;
+    }
     return std::move(scene_);
   }
 
@@ -86,13 +114,12 @@ class SceneReader {
     if (message_.has_sleeping()) scene_.sleeping = message_.sleeping();
     if (message_.has_max_speed()) scene_.max_speed = message_.max_speed();
     scene_.territory_cell = message_.territory_cell();
-    if (message_.joint_size() > 0)
-      throw FieldError("joint[0]",
-                       "joints are part of the format, but SODA does not simulate them yet; the scene has " +
-                           std::to_string(message_.joint_size()));
     if (message_.has_body_count() && message_.body_count() != static_cast<std::uint64_t>(message_.body_size()))
       throw FieldError("body_count", "says " + std::to_string(message_.body_count()) + ", but there are " +
                                          std::to_string(message_.body_size()) + " bodies: is the file cut short?");
+    if (message_.has_joint_count() && message_.joint_count() != static_cast<std::uint64_t>(message_.joint_size()))
+      throw FieldError("joint_count", "says " + std::to_string(message_.joint_count()) + ", but there are " +
+                                          std::to_string(message_.joint_size()) + " joints: is the file cut short?");
   }
 
   void read_materials() {
@@ -159,6 +186,7 @@ class SceneReader {
     body.linear_damping = message.linear_damping();
     body.angular_damping = message.angular_damping();
     if (message.has_drive()) body.drive = read_drive(message.drive());
+    if (message.has_motion()) body.motion = read_motion(message.motion());
 
     double density = kDefaultDensity;
     if (!message.material().empty()) {
@@ -175,6 +203,8 @@ class SceneReader {
     if (message.has_friction()) body.friction = message.friction();
     if (message.has_restitution()) body.restitution = message.restitution();
     if (message.has_colour()) body.colour = message.colour();
+    if (message.has_collision_groups()) body.collision_groups = message.collision_groups();
+    if (message.has_collision_mask()) body.collision_mask = message.collision_mask();
 
     std::vector<double> densities;
     for (int s = 0; s < message.shape_size(); ++s)
@@ -268,8 +298,9 @@ class SceneReader {
     body.inertial = with_mass(body.inertial, message.mass());
   }
 
-  void sort_and_validate() {
-    std::vector<std::size_t> order(scene_.bodies.size());  // sorted position -> position in the file
+  // By id. Returns, for each, its position in the file.
+  std::vector<std::size_t> sort_bodies() {
+    std::vector<std::size_t> order(scene_.bodies.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     const auto& bodies = scene_.bodies;
     if (!std::is_sorted(bodies.begin(), bodies.end(), [](const Body& l, const Body& r) { return l.id < r.id; })) {
@@ -279,12 +310,27 @@ class SceneReader {
       for (std::size_t i : order) sorted.push_back(std::move(scene_.bodies[i]));
       scene_.bodies = std::move(sorted);
     }
-    try {
-      validate(scene_, source_);
-    } catch (SceneError& e) {
-      if (e.body_index != SceneError::kNoBody) e.body_index = order[e.body_index];
-      throw;
+    return order;
+  }
+
+  // Returns, for each in the order of the scene, its position in the file.
+  std::vector<std::size_t> read_joints() {
+    for (int j = 0; j < message_.joint_size(); ++j) {
+      const pb::Joint& joint = message_.joint(j);
+      try {
+        scene_.joints.push_back(read_joint(joint, scene_));
+      } catch (const FieldError& e) {
+        throw SceneError(source_, "", joint_field(j, joint.name(), e.field), e.reason);
+      }
     }
+    std::vector<std::size_t> order(scene_.joints.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t l, std::size_t r) {  // as finish_joints does
+      const Joint &left = scene_.joints[l], &right = scene_.joints[r];
+      return std::tie(left.a, left.b) < std::tie(right.a, right.b);
+    });
+    finish_joints(scene_);
+    return order;
   }
 
   const pb::Scene& message_;
@@ -327,6 +373,8 @@ pb::Scene to_proto(const Scene& scene) {
     out->set_linear_damping(body.linear_damping);
     out->set_angular_damping(body.angular_damping);
     out->set_colour(body.colour);
+    if (body.collision_groups != Body{}.collision_groups) out->set_collision_groups(body.collision_groups);
+    if (body.collision_mask != Body{}.collision_mask) out->set_collision_mask(body.collision_mask);
     if (body.is_static) continue;
     if (!is_zero(body.linear_velocity)) write_vec3(body.linear_velocity, out->mutable_linear_velocity());
     if (!is_zero(body.angular_velocity)) write_vec3(body.angular_velocity, out->mutable_angular_velocity());
@@ -336,6 +384,7 @@ pb::Scene to_proto(const Scene& scene) {
     const Mat3& i = body.inertial.inertia;
     inertia->set_xx(i(0, 0)), inertia->set_yy(i(1, 1)), inertia->set_zz(i(2, 2));
     inertia->set_xy(i(0, 1)), inertia->set_xz(i(0, 2)), inertia->set_yz(i(1, 2));
+    if (body.motion) write_motion(*body.motion, out->mutable_motion());
     if (!body.drive) continue;
     write_vec3(body.drive->velocity, out->mutable_drive()->mutable_velocity());
     out->mutable_drive()->set_max_acceleration(body.drive->max_acceleration);
@@ -343,6 +392,8 @@ pb::Scene to_proto(const Scene& scene) {
     write_vec3(body.drive->bounds->min, out->mutable_drive()->mutable_bounds()->mutable_min());
     write_vec3(body.drive->bounds->max, out->mutable_drive()->mutable_bounds()->mutable_max());
   }
+  for (const Joint& joint : scene.joints) write_joint(joint, message.add_joint());
+  if (!scene.joints.empty()) message.set_joint_count(scene.joints.size());
   return message;
 }
 

@@ -17,8 +17,9 @@ using MeshLoader = std::function<Geometry(const pb::MeshFile& file, bool convex)
 pb::Scene to_proto(const Scene& scene);
 
 // The scene with its materials applied, compounds flattened, missing ids and inertials filled in, hulls reduced to
-// their corners, bodies sorted by id, and everything validated. Throws SceneError, whose body_index counts the bodies
-// in the message's order. from_proto(to_proto(s)) has the bits of s. Without a mesh loader, mesh files are refused.
+// their corners, bodies sorted by id, joints by their bodies, and everything validated. Throws SceneError, whose
+// body_index counts the bodies in the message's order. from_proto(to_proto(s)) has the bits of s. Without a mesh
+// loader, mesh files are refused.
 Scene from_proto(const pb::Scene& message, std::string_view source, const MeshLoader& mesh_loader = {});
 
 }  // namespace soda

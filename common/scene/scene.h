@@ -68,8 +68,18 @@ struct Drive {
   std::optional<Aabb> bounds;
 };
 
-// Of one body: contact records name a pair of shapes in 2 x 12 bits.
-constexpr std::size_t kMaxShapes = 4096;
+// Makes a body kinematic: it follows a function of time, whatever it meets. At time t since its start its frame is at
+// start + velocity t + amplitude (sin(2 pi frequency t + phase) - sin(phase)), turned by angular_velocity t.
+struct PrescribedMotion {
+  Vec3 velocity = Vec3::Zero();          // m/s
+  Vec3 amplitude = Vec3::Zero();         // m
+  double frequency = 0;                  // Hz
+  double phase = 0;                      // rad
+  Vec3 angular_velocity = Vec3::Zero();  // rad/s, world axes
+};
+
+// Of one body: contact records name a pair of shapes in 2 x 12 bits; the last pair means a joint.
+constexpr std::size_t kMaxShapes = 4095;
 
 struct Body {
   BodyId id = 0;
@@ -84,8 +94,11 @@ struct Body {
   double restitution = 0;                // 0 .. 1; of a pair: the larger
   double linear_damping = 0, angular_damping = 0;  // 1/s
   std::optional<Drive> drive;                      // dynamic bodies only
+  std::optional<PrescribedMotion> motion;          // likewise; then nothing else moves it
   double joint_reach = 0;  // m, about the centre of mass, within which its joints act; filled in from them
-  std::uint32_t colour = 0xb0b0b0ff;               // RGBA, for display
+  // Two bodies collide where each one's groups have a bit in the other's mask.
+  std::uint32_t collision_groups = 1, collision_mask = 0xffffffff;
+  std::uint32_t colour = 0xb0b0b0ff;  // RGBA, for display
 };
 
 struct Scene {

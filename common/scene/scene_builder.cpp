@@ -21,6 +21,7 @@ Body& SceneBuilder::add(const Geometry& geometry_, const Vec3& position, const Q
   body.pose = {position, orientation};
   body.shapes = {Shape{geometry(geometry_), Pose{}}};
   densities_.push_back(density);
+  places_.push_back(scene.bodies.size());
   scene.bodies.push_back(std::move(body));
   return scene.bodies.back();
 }
@@ -42,6 +43,32 @@ Body& SceneBuilder::add_ground(double edge, double friction) {
   return ground;
 }
 
+const Pose& SceneBuilder::pose_of(std::size_t dynamic) const {
+  static const Pose kIdentity;
+  return dynamic == kWorld ? kIdentity : scene.bodies.at(places_.at(dynamic)).pose;
+}
+
+Joint& SceneBuilder::add_joint(JointKind kind, std::size_t a, std::size_t b, const Vec3& at, const Vec3& axis) {
+  const Pose frame = joint_frame(kind, at, axis);
+  Joint joint;
+  joint.kind = kind;
+  // The ids that finish() will give.
+  joint.a = a + 1;
+  joint.b = b == kWorld ? kWorldBody : b + 1;
+  joint.frame_a = frame_in(pose_of(a), frame);
+  joint.frame_b = frame_in(pose_of(b), frame);
+  scene.joints.push_back(std::move(joint));
+  return scene.joints.back();
+}
+
+Joint& SceneBuilder::add_rod(std::size_t a, std::size_t b, const Vec3& at_a, const Vec3& at_b) {
+  Joint& joint = add_joint(JointKind::kDistance, a, b, at_a);
+  joint.frame_b = frame_in(pose_of(b), Pose{at_b, Quat::Identity()});
+  const double length = (at_b - at_a).norm();
+  joint.limits = JointLimits{length, length};
+  return joint;
+}
+
 Scene SceneBuilder::finish() {
   MassTable masses(scene);
   BodyId next = 1;
@@ -55,8 +82,11 @@ Scene SceneBuilder::finish() {
   for (Body& body : scene.bodies)
     if (body.is_static) body.id = next++;
   std::sort(scene.bodies.begin(), scene.bodies.end(), [](const Body& l, const Body& r) { return l.id < r.id; });
+  for (Joint& joint : scene.joints) order_ends(scene, joint);
+  finish_joints(scene);
   validate(scene, scene.name);
   densities_.clear();
+  places_.clear();
   index_.clear();
   return std::exchange(scene, Scene{});
 }

@@ -125,9 +125,14 @@ std::string scene_to_text(const Scene& scene) {
   gp::TextFormat::Printer printer;
   printer.SetUseShortRepeatedPrimitives(true);
   printer.SetUseUtf8StringEscaping(true);
-  std::string text;
-  if (!printer.PrintToString(to_proto(scene), &text)) refuse(scene.name, "cannot be written as text");
-  return kTextHeader + text;
+  pb::Scene message = to_proto(scene), first;
+  // Ahead of what it counts, so that no cut takes both away.
+  if (message.has_joint_count()) first.set_joint_count(message.joint_count());
+  message.clear_joint_count();
+  std::string count, text;
+  if (!printer.PrintToString(first, &count) || !printer.PrintToString(message, &text))
+    refuse(scene.name, "cannot be written as text");
+  return kTextHeader + count + text;
 }
 
 Scene scene_from_text(std::string_view text, std::string_view source, const MeshLoader& mesh_loader) {

@@ -7,15 +7,13 @@
 
 #include "common/scene/convex_hull.h"
 #include "common/scene/mass_properties.h"
+#include "common/scene/validate_parts.h"
 
 namespace soda {
-namespace {
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
+using namespace checks;
+
+namespace {
 
 std::string message(const std::string& source, const std::string& body, const std::string& field,
                     const std::string& reason, int line) {
@@ -24,16 +22,6 @@ std::string message(const std::string& source, const std::string& body, const st
   for (const std::string* part : {&body, &field, &reason})
     if (!part->empty()) text += (text.empty() ? "" : ": ") + *part;
   return text;
-}
-
-using MaybeProblem = std::optional<Problem>;
-
-// Whatever the comparison, NaN fails it.
-MaybeProblem in_range(const std::string& field, double value, double low, double high, const char* unit = "") {
-  if (value >= low && value <= high) return {};
-  const std::string range = "must be between " + number(low) + " and " + number(high) + unit;
-  if (!std::isfinite(value)) return Problem{field, "must be a finite number, is " + number(value)};
-  return Problem{field, range + ", is " + number(value)};
 }
 
 MaybeProblem size_in_range(const std::string& field, double value) {
@@ -61,17 +49,23 @@ MaybeProblem length_in_range(const std::string& field, const Vec3& value, double
   return Problem{field, "must not be longer than " + number(limit) + unit + ", is " + number(value.norm())};
 }
 
-MaybeProblem pose_problem(const std::string& field, const Pose& pose) {
-  if (auto p = coordinates(field + ".position", pose.position)) return p;
-  const auto& q = pose.orientation.coeffs();
-  for (int i = 0; i < 4; ++i)
-    if (!std::isfinite(q[i]))
-      return Problem{field + ".orientation", "must be a finite quaternion, has a component " + number(q[i])};
-  const double length = q.norm();
-  if (length == 0) return Problem{field + ".orientation", "must not be the zero quaternion"};
-  if (!(std::abs(length - 1) <= 1e-9))
-    return Problem{field + ".orientation", "must be a unit quaternion, its length is " + number(length)};
-  return {};
+// Well-formed UTF-8 (Protobuf refuses to store anything else) without control characters.
+bool is_printable_utf8(const std::string& text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const unsigned char lead = static_cast<unsigned char>(text[i]);
+    const int more = lead < 0x80 ? 0 : lead >> 5 == 6 ? 1 : lead >> 4 == 14 ? 2 : lead >> 3 == 30 ? 3 : -1;
+    if (more < 0 || lead < 0x20 || lead == 0x7f || i + more >= text.size()) return false;
+    std::uint32_t code = more == 0 ? lead : lead & (0x3fu >> more);
+    for (int k = 1; k <= more; ++k) {
+      const unsigned char next = static_cast<unsigned char>(text[i + k]);
+      if (next >> 6 != 2) return false;
+      code = code << 6 | (next & 0x3fu);
+    }
+    constexpr std::uint32_t kLowest[] = {0, 0x80, 0x800, 0x10000};
+    if (code < kLowest[more] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) return false;
+    i += more + 1;
+  }
+  return true;
 }
 
 struct GeometryCheck {
@@ -182,29 +176,20 @@ MaybeProblem drive_problem(const Drive& drive, double max_speed) {
   return {};
 }
 
-// Well-formed UTF-8 (Protobuf refuses to store anything else) without control characters.
-bool is_printable_utf8(const std::string& text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const unsigned char lead = static_cast<unsigned char>(text[i]);
-    const int more = lead < 0x80 ? 0 : lead >> 5 == 6 ? 1 : lead >> 4 == 14 ? 2 : lead >> 3 == 30 ? 3 : -1;
-    if (more < 0 || lead < 0x20 || lead == 0x7f || i + more >= text.size()) return false;
-    std::uint32_t code = more == 0 ? lead : lead & (0x3fu >> more);
-    for (int k = 1; k <= more; ++k) {
-      const unsigned char next = static_cast<unsigned char>(text[i + k]);
-      if (next >> 6 != 2) return false;
-      code = code << 6 | (next & 0x3fu);
-    }
-    constexpr std::uint32_t kLowest[] = {0, 0x80, 0x800, 0x10000};
-    if (code < kLowest[more] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) return false;
-    i += more + 1;
-  }
-  return true;
-}
-
-MaybeProblem name_problem(const std::string& name) {
-  if (name.size() > kMaxNameLength)
-    return Problem{"name", "must not be longer than " + std::to_string(kMaxNameLength) + " bytes"};
-  if (!is_printable_utf8(name)) return Problem{"name", "must be UTF-8 text without control characters"};
+MaybeProblem motion_problem(const Body& body, double max_speed) {
+  const PrescribedMotion& motion = *body.motion;
+  if (body.drive) return Problem{"drive", "a body that follows a motion has none"};
+  if (body.linear_velocity != Vec3::Zero()) return Problem{"linear_velocity", "the body's motion says it"};
+  if (body.angular_velocity != Vec3::Zero()) return Problem{"angular_velocity", "the body's motion says it"};
+  if (auto p = coordinates("motion.velocity", motion.velocity)) return p;
+  if (auto p = coordinates("motion.amplitude", motion.amplitude)) return p;
+  if (auto p = in_range("motion.frequency", motion.frequency, 0, kMaxFrequency, " Hz")) return p;
+  if (auto p = in_range("motion.phase", motion.phase, -100, 100, " rad")) return p;
+  if (auto p = length_in_range("motion.angular_velocity", motion.angular_velocity, kMaxSpin, " rad/s")) return p;
+  const double fastest = motion.velocity.norm() + 2 * kMaxAngle * motion.frequency * motion.amplitude.norm() +
+                         motion.angular_velocity.norm() * body.inertial.centre.norm();
+  if (!(fastest <= max_speed))
+    return Problem{"motion", "reaches " + number(fastest) + " m/s; the scene's max_speed is " + number(max_speed)};
   return {};
 }
 
@@ -247,8 +232,10 @@ MaybeProblem body_problem(const Scene& scene, const Body& body) {
   if (auto p = in_range("angular_damping", body.angular_damping, 0, kMaxDamping, " 1/s")) return p;
   if (!body.is_static) {
     if (auto p = inertial_problem(body.inertial)) return p;
+    if (body.motion) return motion_problem(body, scene.max_speed);
     return body.drive ? drive_problem(*body.drive, scene.max_speed) : std::nullopt;
   }
+  if (body.motion) return Problem{"motion", "a static body does not move"};
   if (body.drive) return Problem{"drive", "a static body does not move"};
   if (body.linear_velocity != Vec3::Zero()) return Problem{"linear_velocity", "a static body does not move"};
   if (body.angular_velocity != Vec3::Zero()) return Problem{"angular_velocity", "a static body does not move"};
@@ -256,6 +243,43 @@ MaybeProblem body_problem(const Scene& scene, const Body& body) {
 }
 
 }  // namespace
+
+namespace checks {
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+MaybeProblem in_range(const std::string& field, double value, double low, double high, const char* unit) {
+  if (value >= low && value <= high) return {};
+  const std::string range = "must be between " + number(low) + " and " + number(high) + unit;
+  if (!std::isfinite(value)) return Problem{field, "must be a finite number, is " + number(value)};
+  return Problem{field, range + ", is " + number(value)};
+}
+
+MaybeProblem pose_problem(const std::string& field, const Pose& pose) {
+  if (auto p = coordinates(field + ".position", pose.position)) return p;
+  const auto& q = pose.orientation.coeffs();
+  for (int i = 0; i < 4; ++i)
+    if (!std::isfinite(q[i]))
+      return Problem{field + ".orientation", "must be a finite quaternion, has a component " + number(q[i])};
+  const double length = q.norm();
+  if (length == 0) return Problem{field + ".orientation", "must not be the zero quaternion"};
+  if (!(std::abs(length - 1) <= 1e-9))
+    return Problem{field + ".orientation", "must be a unit quaternion, its length is " + number(length)};
+  return {};
+}
+
+MaybeProblem name_problem(const std::string& name) {
+  if (name.size() > kMaxNameLength)
+    return Problem{"name", "must not be longer than " + std::to_string(kMaxNameLength) + " bytes"};
+  if (!is_printable_utf8(name)) return Problem{"name", "must be UTF-8 text without control characters"};
+  return {};
+}
+
+}  // namespace checks
 
 SceneError::SceneError(std::string source_, std::string body_, std::string field_, std::string reason_, int line_,
                        std::size_t body_index_)
@@ -277,7 +301,7 @@ std::optional<Problem> problem_in(const Geometry& geometry, bool is_static) {
   return std::visit(GeometryCheck{is_static}, geometry);
 }
 
-void validate(const Scene& scene, std::string_view source) {
+void validate(const Scene& scene, std::string_view source, std::span<const std::size_t> joint_numbers) {
   if (auto p = scene_problem(scene)) throw SceneError(std::string(source), "", p->field, p->reason);
   // Shared geometry once for each kind of body: hulls are costly to check.
   std::vector<bool> checked[2] = {std::vector<bool>(scene.geometries.size()),
@@ -305,6 +329,10 @@ void validate(const Scene& scene, std::string_view source) {
     if (!checked[0][g] && !checked[1][g])  // used by nobody, but it must be sound all the same
       if (auto p = problem_in(scene.geometries[g], true))
         throw SceneError(std::string(source), "", "geometry[" + std::to_string(g) + "]." + p->field, p->reason);
+  if (const auto p = problem_in_joints(scene)) {
+    const std::size_t number = joint_numbers.empty() ? p->joint : joint_numbers[p->joint];
+    throw SceneError(std::string(source), "", joint_field(number, scene.joints[p->joint].name, p->field), p->reason);
+  }
 }
 
 }  // namespace soda

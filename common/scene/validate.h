@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -46,16 +47,29 @@ constexpr double kMaxAcceleration = 1e6;                 // m/s^2, of gravity an
 constexpr double kMinStep = 1e-6, kMaxStep = 1;          // s, of Scene::dt
 constexpr unsigned kMaxSubsteps = 64;
 constexpr double kMaxFriction = 100;
-constexpr double kMaxDamping = 1e4;           // 1/s
+constexpr double kMaxDamping = 1e4;                   // 1/s
+constexpr double kMaxAngle = 3.14159265358979323846;  // rad, of limits of hinges and twists
+constexpr double kMaxEffort = 1e18;                   // N, N m
+constexpr double kMaxFrequency = 1e4;                 // Hz, of springs
+constexpr double kMaxDampingRatio = 100;
+constexpr std::size_t kMaxJointsOfPair = 255;
 constexpr std::size_t kMaxNameLength = 1000;  // bytes
 constexpr std::size_t kMaxHullPoints = 100'000;
 
-// Throws SceneError for the first thing wrong. `source` is the name that the error shows.
-void validate(const Scene& scene, std::string_view source);
+// Throws SceneError for the first thing wrong. `source` is the name that the error shows. `joint_numbers`: of each
+// joint, the number that the error shows, where that is not its place in the scene.
+void validate(const Scene& scene, std::string_view source, std::span<const std::size_t> joint_numbers = {});
 
 // What validate checks about a shape's geometry; `field` starts with the geometry's kind, as in "box.size.y".
 // Convex hulls are also checked for volume, which costs building them.
 std::optional<Problem> problem_in(const Geometry& geometry, bool is_static);
+
+// What validate checks about a joint alone, without its bodies; `field` is relative to the joint, as in
+// "hinge.limits.lower".
+std::optional<Problem> problem_in(const Joint& joint);
+
+// `joint[3] "elbow".hinge.limits`, or `joint[3].hinge.limits` without a name.
+std::string joint_field(std::size_t number, const std::string& name, const std::string& field);
 
 // `body 7 "crate"`, or `body 7` without a name.
 std::string label_of(const Body& body);

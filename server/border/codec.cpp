@@ -82,6 +82,8 @@ void check(const ContactRecord& record, const physics::Model& model) {
     throw CodecError("contact of " + name(record.a) + ": partner not in the scene");
   if (!record.with_static() && record.b <= record.a)
     throw CodecError("contact of " + name(record.a) + ": does not belong to the lower id");
+  if (is_joint(record) ? !model.find_joint(record) : record.b == (kStaticBit | kWorldBody))
+    throw CodecError("joint of " + name(record.a) + ": not in the scene");
   constexpr int kHeadDoubles = (static_cast<int>(kRecordHead) - 24) / 8;
   if (!finite(record.normal, kHeadDoubles)) throw CodecError("contact of " + name(record.a) + ": not finite");
   if (!unit(record.orientation_a) || !unit(record.orientation_b))

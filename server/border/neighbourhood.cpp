@@ -52,7 +52,7 @@ Neighbourhood::Neighbourhood(const physics::Model& model, const TerritoryMap& ma
 
 void Neighbourhood::model_grew() {
   for (const physics::BodyModel& m : model_.bodies().subspan(ordinary_below_.size())) {
-    const double room = (half_edge_ - 2 * m.radius - physics::kContactMargin) / model_.scene().dt;
+    const double room = (half_edge_ - 2 * m.reach - physics::kContactMargin) / model_.scene().dt;
     ordinary_below_.push_back(room > 0 ? room * room : -1);
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/physics/kinematics.h"
 #include "server/physics/tuning.h"
 
 namespace soda::physics {
@@ -66,6 +67,7 @@ void begin_step(const BodyState& state, const BodyModel& model, MovingBody& body
 
 void accelerate(MovingBody& body, double h, const StepConstants& constants) {
   const BodyModel& model = *body.model;
+  if (model.kinematic) return;
   body.v += h * constants.gravity;
   if (model.drive) {
     Vec3 wanted = body.drive_target - body.v;
@@ -120,6 +122,10 @@ void fly(MovingBody& body, const StepConstants& constants) {
 }
 
 bool end_step(MovingBody& body, const StepConstants& constants, BodyState& state) {
+  if (body.model->kinematic) {
+    follow(*body.model->kinematic, state.quiet_steps + 1, constants.dt, state);
+    return true;
+  }
   if (body.model->drive) (void)drive_target(*body.model->drive, body.x, state.flags);
   state.flags &= ~std::uint32_t{kAsleep};
   const Vec3 x = body.x + body.moved;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/grid.h"
+#include "server/physics/kinematics.h"
 
 namespace soda::physics {
 namespace {
@@ -40,6 +41,7 @@ Model::Model(Scene scene) : scene_(std::move(scene)) {
       s.rotation = s.pose.orientation.toRotationMatrix();
       s.friction = body.friction;
       s.restitution = body.restitution;
+      s.filter = {body.collision_groups, body.collision_mask};
       s.first_child = first;
       s.children = children;
       s.box = bounding_box(shapes_.children(first, children), s.pose.position, s.rotation);
@@ -47,7 +49,7 @@ Model::Model(Scene scene) : scene_(std::move(scene)) {
       continue;
     }
     add_dynamic(scene_, body);
-    radii.push_back(bodies_.back().radius);
+    radii.push_back(bodies_.back().reach);
   }
   if (radii.empty()) return;
   diameter_ = 2 * largest_ordinary_radius(radii);
@@ -56,6 +58,57 @@ Model::Model(Scene scene) : scene_(std::move(scene)) {
     index_.assign(last + 1, kNone);
     for (std::uint32_t i = 0; i < bodies_.size(); ++i) index_[bodies_[i].id] = i;
   }
+  add_joints();
+}
+
+void Model::add_joints() {
+  struct End {
+    std::size_t body;
+    Anchor anchor;
+  };
+  std::vector<End> ends;
+  std::vector<std::pair<std::size_t, JointModel>> owned;
+  const auto place_of = [&](BodyId id) { return static_cast<std::size_t>(find(id) - bodies_.data()); };
+  const auto centred = [&](const Pose& frame, BodyId id) {
+    const Pose unit{frame.position, normalized(frame.orientation)};
+    if (id == kWorldBody) return unit;
+    if (const StaticModel* const fixed = find_static(id)) return fixed->pose * unit;
+    const auto body = std::lower_bound(scene_.bodies.begin(), scene_.bodies.end(), id,
+                                       [](const Body& b, BodyId i) { return b.id < i; });
+    return Pose{unit.position - body->inertial.centre, unit.orientation};
+  };
+  for (const Joint& joint : scene_.joints) {
+    const bool moves = joint.b != kWorldBody && find(joint.b);
+    JointModel m{&joint, moves ? joint.b : kStaticBit | joint.b, kJointPart, centred(joint.frame_a, joint.a),
+                 centred(joint.frame_b, joint.b)};
+    ends.push_back({place_of(joint.a), {m.at_a.position, joint_reach_a(scene_, joint)}});
+    if (moves) ends.push_back({place_of(joint.b), {m.at_b.position, joint_reach_b(scene_, joint)}});
+    owned.emplace_back(place_of(joint.a), m);
+  }
+  std::stable_sort(owned.begin(), owned.end(), [](const auto& l, const auto& r) {
+    return l.first != r.first ? l.first < r.first : l.second.b < r.second.b;
+  });
+  for (const auto& [body, joint] : owned) {
+    BodyModel& a = bodies_[body];
+    if (a.joints++ == 0) a.first_joint = static_cast<std::uint32_t>(joints_.size());
+    joints_.push_back(joint);
+    if (a.joints > 1 && joints_[joints_.size() - 2].b == joint.b)
+      joints_.back().part = joints_[joints_.size() - 2].part + 1;
+  }
+  std::stable_sort(ends.begin(), ends.end(), [](const End& l, const End& r) { return l.body < r.body; });
+  for (const End& end : ends) {
+    BodyModel& body = bodies_[end.body];
+    if (body.anchors++ == 0) body.first_anchor = static_cast<std::uint32_t>(anchors_.size());
+    anchors_.push_back(end.anchor);
+  }
+}
+
+const JointModel* Model::find_joint(const ContactRecord& record) const {
+  const BodyModel* const a = find(record.a);
+  if (!a) return nullptr;
+  for (const JointModel& joint : joints_of(*a))
+    if (joint.b == record.b && joint.part == record.part) return &joint;
+  return nullptr;
 }
 
 void Model::add_dynamic(const Scene& scene, const Body& body) {
@@ -70,15 +123,23 @@ void Model::add_dynamic(const Scene& scene, const Body& body) {
   m.isotropic = is_isotropic(m.inertia);
   m.friction = body.friction;
   m.restitution = body.restitution;
+  m.filter = {body.collision_groups, body.collision_mask};
   m.linear_damping = body.linear_damping;
   m.angular_damping = body.angular_damping;
   m.first_child = first;
   m.children = children;
   m.radius = bounding_radius(scene, body);
+  m.reach = std::max(m.radius, body.joint_reach);
   m.inner_extent = m.radius;
   for (const Child& child : shapes_.children(first, children))
     m.inner_extent = std::min(m.inner_extent, child.inner_extent);
   m.drive = body.drive ? &*body.drive : nullptr;
+  if (body.motion) {
+    m.kinematic = &body;
+    m.inverse_mass = 0;
+    m.inverse_inertia.setZero();
+    m.isotropic = true;
+  }
   bodies_.push_back(m);
 }
 
@@ -100,9 +161,11 @@ const BodyModel* Model::find(BodyId id) const {
   return &bodies_[index_[id]];
 }
 
-const StaticModel* Model::find_static(BodyId id) const { return find_by_id(statics_, id); }
+const StaticModel* Model::find_static(BodyId id) const {
+  return id == kWorldBody ? &world_ : find_by_id(statics_, id);
+}
 
-BodyState Model::state_of(const Body& body) {
+BodyState Model::state_of(const Body& body) const {
   BodyState s;
   s.id = body.id;
   const Quat q = normalized(body.pose.orientation);
@@ -110,6 +173,7 @@ BodyState Model::state_of(const Body& body) {
   s.set_q(q);
   s.set_v(body.linear_velocity);
   s.set_w(body.angular_velocity);
+  if (body.motion) follow(body, 0, scene_.dt, s);
   return s;
 }
 

@@ -27,15 +27,11 @@ static_assert(offsetof(MovingBody, v) == offsetof(Motion, v) && offsetof(MovingB
 
 }  // namespace
 
-IslandSolver::Softness IslandSolver::softness(bool with_static) const {
-  const double h = constants_.h;
-  double hertz = std::min(kContactHertzCap, kContactHertzPerSubstepRate / h);
+Softness IslandSolver::softness(bool with_static) const {
+  double hertz = std::min(kContactHertzCap, kContactHertzPerSubstepRate / constants_.h);
   double damping = kContactDampingRatio;
   if (with_static) hertz *= kStaticHertzFactor, damping *= kStaticDampingFactor;
-  // Catto 2024: a harmonic oscillator of that frequency and damping, integrated implicitly over h.
-  const double omega = 2 * 3.14159265358979323846 * hertz;
-  const double a1 = 2 * damping + h * omega, a2 = h * omega * a1, a3 = 1 / (1 + a2);
-  return {omega / a1, a2 * a3, a3};
+  return soften(hertz, damping, constants_.h);
 }
 
 std::pair<Batch*, int> IslandSolver::lane_for(std::uint32_t a, std::uint32_t b) {
@@ -207,9 +203,14 @@ void IslandSolver::solve(std::span<MovingBody> bodies, std::span<const std::uint
                          std::span<const std::uint32_t> contacts, std::span<const Ends> ends,
                          std::span<const Surface> surfaces, std::span<ContactRecord> records) {
   used_ = 0;
+  joints_.clear();
   for (const std::uint32_t index : contacts) {
     const std::uint32_t a = slot_of[ends[index].a];
     const std::uint32_t b = ends[index].b == kStaticSlot ? kNoBody : slot_of[ends[index].b];
+    if (surfaces[index].joint) {
+      joints_.add(*surfaces[index].joint, a, b, index, records[index]);
+      continue;
+    }
     const auto [batch, lane] = lane_for(a, b);
     batch->record[lane] = index;
     prepare(bodies, a, b, surfaces[index], records[index], *batch, lane);
@@ -221,13 +222,17 @@ void IslandSolver::solve(std::span<MovingBody> bodies, std::span<const std::uint
   for (std::uint32_t i = 0; i < constants_.substeps; ++i) {
     if (bounces) strike(std::span(batches_).first(used_), bodies, constants_.h, gravity);
     for (MovingBody& body : bodies) accelerate(body, constants_.h, constants_);
+    joints_.begin(bodies, constants_.h);
     kernel_->warm_start(batches_.data(), used_, moving);
+    joints_.pass(bodies, true);
     kernel_->pass(batches_.data(), used_, moving, 1 / constants_.h, true);
     for (MovingBody& body : bodies) move(body, constants_.h, constants_);
+    joints_.pass(bodies, false);
     kernel_->pass(batches_.data(), used_, moving, 1 / constants_.h, false);
   }
   settle_torques(bodies);
   store(records);
+  joints_.store(records);
 }
 
 }  // namespace soda::physics

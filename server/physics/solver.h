@@ -11,6 +11,8 @@
 #include "common/contact_record.h"
 #include "server/physics/integrator.h"
 #include "server/physics/islands.h"
+#include "server/physics/joints.h"
+#include "server/physics/softness.h"
 #include "server/physics/solver_kernel.h"
 
 namespace soda::physics {
@@ -19,6 +21,7 @@ namespace soda::physics {
 struct Surface {
   double friction = 0, restitution = 0;  // of the pair
   const StaticModel* fixed = nullptr;    // b, where it is static
+  const JointModel* joint = nullptr;     // or, instead of all of these, the joint that the record is of
 };
 
 class IslandSolver {
@@ -39,10 +42,6 @@ class IslandSolver {
              std::span<ContactRecord> records);
 
  private:
-  struct Softness {
-    double bias_rate, mass_scale, impulse_scale;
-  };
-
   // The next lane for a contact of these two bodies: in the newest batch if it has room and shares neither.
   std::pair<Batch*, int> lane_for(std::uint32_t a, std::uint32_t b);
   void prepare(std::span<const MovingBody> bodies, std::uint32_t a, std::uint32_t b, const Surface& surface,
@@ -55,6 +54,7 @@ class IslandSolver {
   const StepConstants& constants_;
   Softness soft_, soft_static_;
   const Kernel* kernel_ = &chosen_kernel();
+  JointSolver joints_;
   std::vector<Batch> batches_;
   std::size_t used_ = 0;  // of batches_
   int lanes_ = 0;         // used in the newest

@@ -34,7 +34,10 @@ class StageClock {
 };
 
 void forget_impulses(ContactRecord& record) {
-  for (auto& point : record.points) point.impulse = 0;
+  for (auto& point : record.points) {
+    point.impulse = 0;
+    if (is_joint(record)) point = {};
+  }
   for (double& component : record.friction) component = 0;
   record.twist = 0;
 }
@@ -48,19 +51,44 @@ std::vector<Aabb> static_boxes(const Model& model) {
 // Broad-phase cells hold an ordinary body's reach box at moderate speed.
 double broad_cell(const Model& model) { return 1.1 * model.largest_ordinary_diameter() + 4 * kContactMargin; }
 
+bool may_collide(std::span<const JointModel> joints) {
+  return std::all_of(joints.begin(), joints.end(), [](const JointModel& j) { return j.joint->bodies_collide; });
+}
+
+// The joint's record: as it was, or a new one.
+void add_joint(BodyId a, const JointModel& joint, std::span<const ContactRecord> previous,
+               std::vector<ContactRecord>& out) {
+  for (const ContactRecord& record : previous) {
+    if (record.part != joint.part) continue;
+    out.push_back(record);
+    return;
+  }
+  ContactRecord record;
+  record.a = a;
+  record.b = joint.b;
+  record.part = joint.part;
+  record.count = 1;
+  out.push_back(record);
+}
+
 constexpr std::size_t kGroupContacts = 256;  // of islands that are solved together; their batches stay in the cache
 
 }  // namespace
 
 Aabb reach_box(const BodyState& state, const BodyModel& model, const Mat3& rotation, const Model& scene) {
   Aabb box = bounding_box(scene.shapes().children(model.first_child, model.children), state.x(), rotation);
+  for (const Anchor& anchor : scene.anchors_of(model)) {
+    const Vec3 place = state.x() + rotation * anchor.place;
+    box.min = box.min.cwiseMin((place.array() - anchor.reach).matrix());
+    box.max = box.max.cwiseMax((place.array() + anchor.reach).matrix());
+  }
   double grow = kContactMargin;
   if (!state.asleep()) {
     const Vec3 travel = scene.scene().dt * state.v();
     box.min += travel.cwiseMin(0.0);
     box.max += travel.cwiseMax(0.0);
     // Turning: no point moves further than this, nor further out than the radius.
-    grow += std::min(state.w().norm() * scene.scene().dt, 1.0) * model.radius;
+    grow += std::min(state.w().norm() * scene.scene().dt, 1.0) * model.reach;
   }
   box.min.array() -= grow;
   box.max.array() += grow;
@@ -183,13 +211,27 @@ void Stepper::contacts_of(std::span<const BodyState> bodies, std::uint32_t body,
     return previous.subspan(first, next - first);
   };
   const Party self = party(state, body);
+  auto joints = model_.joints_of(*models_[body]);
+  // Those with this partner: taken off the front.
+  const auto joints_with = [&](BodyId partner) {
+    while (!joints.empty() && joints.front().b < partner) joints = joints.subspan(1);
+    std::size_t count = 0;
+    while (count < joints.size() && joints[count].b == partner) ++count;
+    const auto found = joints.first(count);
+    joints = joints.subspan(count);
+    return found;
+  };
   const double own_reach = state.w().norm() * models_[body]->radius;
   for (const std::uint32_t partner : pairs_.of(body)) {
     const BodyState& other = bodies[partner];
     keep_sleeping_until(other.id);
     const double approach = (state.v() - other.v()).norm() + own_reach + other.w().norm() * models_[partner]->radius;
-    updater_.update(self, party(other, partner), records_with(other.id),
-                    kSpeculativeDistance + approach * constants_.dt, out);
+    const Records old = records_with(other.id);
+    const auto joined = joints_with(other.id);
+    if (may_collide(joined) && models_[body]->filter.admits(models_[partner]->filter) &&
+        !(models_[body]->kinematic && models_[partner]->kinematic))
+      updater_.update(self, party(other, partner), old, kSpeculativeDistance + approach * constants_.dt, out);
+    for (const JointModel& joint : joined) add_joint(state.id, joint, old, out);
   }
   keep_sleeping_until(kStaticBit);
   if (!wanted) return;
@@ -197,11 +239,28 @@ void Stepper::contacts_of(std::span<const BodyState> bodies, std::uint32_t body,
     out.insert(out.end(), previous.begin() + static_cast<std::ptrdiff_t>(next), previous.end());
     return;
   }
+  if (models_[body]->kinematic) return;
   statics_.find(boxes_[body], near_statics_);
+  const auto with_world = joints_with(kStaticBit | kWorldBody);
+  if (!with_world.empty()) {
+    const Records old = records_with(kStaticBit | kWorldBody);
+    for (const JointModel& joint : with_world) add_joint(state.id, joint, old, out);
+  }
+  if (!joints.empty()) {  // static bodies at any distance
+    for (const JointModel& joint : joints)
+      near_statics_.push_back(
+          static_cast<std::uint32_t>(model_.find_static(joint.b & ~kStaticBit) - model_.statics().data()));
+    std::sort(near_statics_.begin(), near_statics_.end());
+    near_statics_.erase(std::unique(near_statics_.begin(), near_statics_.end()), near_statics_.end());
+  }
   const double reach = kSpeculativeDistance + (state.v().norm() + own_reach) * constants_.dt;
   for (const std::uint32_t s : near_statics_) {
     const StaticModel& fixed = model_.statics()[s];
-    updater_.update(self, party(fixed), records_with(kStaticBit | fixed.id), reach, out);
+    const Records old = records_with(kStaticBit | fixed.id);
+    const auto joined = joints_with(kStaticBit | fixed.id);
+    if (may_collide(joined) && models_[body]->filter.admits(fixed.filter))
+      updater_.update(self, party(fixed), old, reach, out);
+    for (const JointModel& joint : joined) add_joint(state.id, joint, old, out);
   }
 }
 
@@ -269,6 +328,12 @@ void Stepper::solve(std::span<BodyState> bodies, std::span<ContactRecord> contac
 }
 
 void Stepper::find_surface(const ContactRecord& contact, const Ends& ends, Surface& surface) const {
+  surface.joint = nullptr;
+  if (is_joint(contact)) {
+    surface.joint = model_.find_joint(contact);
+    if (!surface.joint) throw std::invalid_argument("step: a record names a joint that is not in the scene");
+    return;
+  }
   const BodyModel& a = *moving_[island_slot_[ends.a]].model;
   double friction, restitution;
   if (ends.b == kStaticSlot) {
@@ -311,7 +376,7 @@ void Stepper::finish(std::span<BodyState> bodies, std::span<ContactRecord> conta
       finite = false;
     }
     counters.clamped += body.clamped;
-    quiet = quiet && state.quiet_steps >= constants_.quiet_steps_to_sleep;
+    quiet = quiet && !body.model->kinematic && state.quiet_steps >= constants_.quiet_steps_to_sleep;
   }
   if (!finite)  // nor are the impulses that came with it
     for (const std::uint32_t c : islands.contacts_of(one.island)) forget_impulses(contacts[c]);

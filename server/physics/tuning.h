@@ -32,6 +32,10 @@ constexpr double kImpactReach = 1.001;        // of what is covered in a sub-ste
 constexpr int kImpactIterations = 16;         // over the points of one manifold
 constexpr int kMostImpactRounds = 64;         // over an island, in one sub-step; what strikes later is stopped
 
+// ---- joints: stiffer than contacts, since both signs of an impulse are allowed
+constexpr double kJointHertzPerSubstepRate = 0.25;
+constexpr double kJointDampingRatio = 2;
+
 // ---- integration
 constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning is taken as free of gyroscopic torque
 constexpr int kMidpointIterations = 4;     // each gains a factor of about (angle per sub-step x anisotropy)

@@ -48,7 +48,7 @@ std::vector<Effects::Change> Effects::add(const LoggedAction& entry) {
                  },
                  [&](const Spawn& a) {
                    const Body& body = a.body->bodies.front();
-                   put(entry.step, body.id, Given{physics::Model::state_of(body)});
+                   put(entry.step, body.id, Given{model_.state_of(body)});
                  },
                  [&](const Grab& a) {
                    Held h{entry.number, slot_of(a.body), entry.step, kEver, {}, {{entry.step, a.target}}};

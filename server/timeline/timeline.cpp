@@ -157,7 +157,7 @@ void Timeline::extend() {
 }
 
 bool Timeline::is_large(Slot slot, const BodyState& body) const {
-  const double radius = model_.bodies()[slot].radius, dt = model_.scene().dt;
+  const double radius = model_.bodies()[slot].reach, dt = model_.scene().dt;
   const double reach =
       radius * (1 + std::min(1.0, body.w().norm() * dt)) + body.v().norm() * dt + physics::kContactMargin;
   return reach > index_.ordinary_reach();

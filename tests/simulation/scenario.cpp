@@ -58,8 +58,10 @@ std::vector<WorldId> confetti(const Scene& scene, WorldId worlds, std::uint64_t 
 
 Scenario scenario_of(std::uint64_t seed) {
   std::mt19937_64 random(seed * 104729 + 1);
-  const auto& scenes = hard_scenes();
-  const HardScene& hard = scenes[random() % scenes.size()];
+  // Machines came later; other seeds keep the meaning that they had, for tests name some.
+  constexpr std::size_t kFirst = 9;
+  const HardScene& first = hard_scenes()[random() % kFirst];
+  const HardScene& hard = seed % 7 == 3 ? hard_scene("machines") : first;
   Scenario s;
   s.scene = hard.name;
   s.worlds = 2 + static_cast<WorldId>(random() % 8);

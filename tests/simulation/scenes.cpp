@@ -13,6 +13,7 @@ Scene piles() { return generate("piles", 162, 3); }
 Scene heap() { return generate("heap", 420, 5); }
 Scene cubes() { return generate("cubes", 150, 11); }
 Scene city() { return generate("city", 240, 2); }
+Scene machines() { return generate("machines", 120, 1); }
 Scene cluster() { return generate("cluster", 108, 4); }
 
 // Sleeping boxes in a row across many cells, touching; one end is struck when all are asleep. The wave of waking
@@ -86,6 +87,7 @@ const std::vector<HardScene>& hard_scenes() {
       {"wide_bodies", wide_bodies, 150, true},
       {"fast_bodies", fast_bodies, 150, false},
       {"corner", corner, 200, true},
+      {"machines", machines, 200, true},
   };
   return scenes;
 }

@@ -64,6 +64,7 @@ Scene city_case() { return generate("city", 160, 3); }
 Scene towers_case() { return with_meteor(generate("towers", 90, 3), 20); }
 Scene dominoes_case() { return generate("dominoes", 60, 4); }
 Scene cluster_case() { return generate("cluster", 120, 5); }
+Scene machines_case() { return generate("machines", 108, 1); }
 Scene shapes_case() { return with_meteor(shapes_scene(), 150); }
 Scene wide_case() { return with_meteor(wide_scene(), 210); }
 
@@ -165,6 +166,7 @@ const std::vector<Case>& cases() {
       {"piles", piles_case, 400, true, true},       {"heap", heap_case, 300, false, false},
       {"city", city_case, 240, false, false},       {"towers", towers_case, 240, true, true},
       {"dominoes", dominoes_case, 420, true, true}, {"cluster", cluster_case, 240, false, false},
+      {"machines", machines_case, 300, true, true},
       {"shapes", shapes_case, 420, true, true},     {"wide", wide_case, 460, true, true},
   };
   return all;

@@ -126,7 +126,6 @@ const BadInput kBad[] = {
     {"IdZero", "body {\n id: 0 name: \"b\" " BOX "}", "body 0 \"b\"", "id", "between 1"},
     {"IdTooLarge", "body {\n id: 9223372036854775808 name: \"b\" " BOX "}", "body 9223372036854775808 \"b\"", "id",
      "2^63"},
-    {"Joint", BODY(BOX) "\n joint { body_a: 1 hinge {} }", "", "joint[0]", "not simulate"},
     {"NoBodiesButCount", "\nbody_count: 3", "", "body_count", "cut short"},
     {"NanGravity", "gravity {\n x: nan }", "", "gravity.x", "finite"},
     {"ZeroStep", "\ndt: 0 " BODY(BOX), "", "dt", "is 0"},

@@ -281,15 +281,6 @@ INSTANTIATE_TEST_SUITE_P(
         BadSdf{"NotSdf", "<robot name='r'/>", "<sdf>"}, BadSdf{"Empty", "", "XML"},
         BadSdf{"NoVersion", "<sdf><world name='w'/></sdf>", "version"},
         BadSdf{"NothingToSimulate", world(""), "no model"},
-        BadSdf{"Joint",
-               world("<model name='arm'><link name='a'>" + kBox + "</link><link name='b'>" + kBox +
-                     "</link><joint name='elbow' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 0 "
-                     "1</xyz></axis></joint></model>"),
-               "model \"arm\": joint: joints are not simulated yet"},
-        BadSdf{"FixedJoint",
-               world("<model name='arm'><link name='a'>" + kBox + "</link><link name='b'>" + kBox +
-                     "</link><joint name='weld' type='fixed'><parent>a</parent><child>b</child></joint></model>"),
-               "\"weld\""},
         BadSdf{"NanPose", world("<model name='m'><pose>nan 0 0 0 0 0</pose><link name='l'>" + kBox + "</link></model>"),
                "body 1 \"m::l\": pose.position.x"},
         BadSdf{"FarAway", world("<model name='m'><pose>1e9 0 0 0 0 0</pose><link name='l'>" + kBox + "</link></model>"),

@@ -67,6 +67,32 @@ bool same_bits_of(const Vector& a, const Vector& b) {
   return true;
 }
 
+inline void expect_same_bits(const Joint& a, const Joint& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.kind, b.kind);
+  EXPECT_TRUE(a.a == b.a && a.b == b.b && a.bodies_collide == b.bodies_collide);
+  for (const auto& [l, r] : {std::pair{a.frame_a, b.frame_a}, std::pair{a.frame_b, b.frame_b}}) {
+    EXPECT_TRUE(same_bits_of(l.position, r.position));
+    EXPECT_TRUE(same_bits_of(l.orientation.coeffs(), r.orientation.coeffs()));
+  }
+  ASSERT_TRUE(a.limits.has_value() == b.limits.has_value() && a.cone_limit.has_value() == b.cone_limit.has_value() &&
+              a.motor.has_value() == b.motor.has_value() && a.spring.has_value() == b.spring.has_value());
+  if (a.limits) {
+    EXPECT_TRUE(same_bits(a.limits->lower, b.limits->lower) && same_bits(a.limits->upper, b.limits->upper));
+  }
+  if (a.cone_limit) {
+    EXPECT_TRUE(same_bits(*a.cone_limit, *b.cone_limit));
+  }
+  if (a.motor) {
+    EXPECT_TRUE(same_bits(a.motor->target_velocity, b.motor->target_velocity) &&
+                same_bits(a.motor->max_effort, b.motor->max_effort));
+  }
+  if (a.spring) {
+    EXPECT_TRUE(same_bits(a.spring->frequency, b.spring->frequency) &&
+                same_bits(a.spring->damping_ratio, b.spring->damping_ratio));
+  }
+}
+
 // Field by field, so that it does not rest on the encoding under test.
 inline void expect_same_bits(const Scene& a, const Scene& b) {
   EXPECT_EQ(a.name, b.name);
@@ -91,7 +117,7 @@ inline void expect_same_bits(const Scene& a, const Scene& b) {
     EXPECT_TRUE(same_bits_of(l.angular_velocity, r.angular_velocity));
     EXPECT_TRUE(same_bits(l.friction, r.friction) && same_bits(l.restitution, r.restitution));
     EXPECT_TRUE(same_bits(l.linear_damping, r.linear_damping) && same_bits(l.angular_damping, r.angular_damping));
-    EXPECT_TRUE(same_bits(l.inertial.mass, r.inertial.mass));
+    EXPECT_TRUE(same_bits(l.inertial.mass, r.inertial.mass) && same_bits(l.joint_reach, r.joint_reach));
     EXPECT_TRUE(same_bits_of(l.inertial.centre, r.inertial.centre));
     EXPECT_TRUE(same_bits_of(l.inertial.inertia, r.inertial.inertia));
     ASSERT_EQ(l.shapes.size(), r.shapes.size());
@@ -109,6 +135,11 @@ inline void expect_same_bits(const Scene& a, const Scene& b) {
       EXPECT_TRUE(same_bits_of(l.drive->bounds->min, r.drive->bounds->min));
       EXPECT_TRUE(same_bits_of(l.drive->bounds->max, r.drive->bounds->max));
     }
+  }
+  ASSERT_EQ(a.joints.size(), b.joints.size());
+  for (std::size_t j = 0; j < a.joints.size(); ++j) {
+    SCOPED_TRACE("joint " + std::to_string(j));
+    expect_same_bits(a.joints[j], b.joints[j]);
   }
 }
 

@@ -1,0 +1,298 @@
+#include "server/physics/joints.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/physics/solver_kernel.h"
+#include "server/physics/tuning.h"
+
+namespace soda::physics {
+namespace {
+
+Vec3 vec(const double* p) { return Vec3(p[0], p[1], p[2]); }
+void put(const Vec3& v, double* p) { p[0] = v.x(), p[1] = v.y(), p[2] = v.z(); }
+
+// One end of a joint as it is now.
+struct End {
+  Vec3 arm, place;  // m: from the centre of mass to the frame's origin; in the world
+  Quat frame;       // to the world
+  Mat3 inverse_inertia = Mat3::Zero();
+  double inverse_mass = 0;
+};
+
+End end_of(const MovingBody& body, const Pose& at) {
+  End end;
+  end.arm = body.q * at.position;
+  end.place = body.x + body.moved + end.arm;
+  end.frame = body.q * at.orientation;
+  end.inverse_mass = body.inverse_mass;
+  if (body.model->isotropic) {
+    end.inverse_inertia = body.model->inverse_inertia;
+  } else {
+    const Mat3 rotation = body.q.toRotationMatrix();
+    end.inverse_inertia = rotation * body.model->inverse_inertia * rotation.transpose();
+  }
+  return end;
+}
+
+End end_of(const Pose& in_world) {
+  End end;
+  end.arm = Vec3::Zero();
+  end.place = in_world.position;
+  end.frame = in_world.orientation;
+  return end;
+}
+
+double speed(const Vec3& linear, const Vec3& a_turn, const Vec3& b_turn, const MovingBody& a, const MovingBody* b) {
+  const double of_a = linear.dot(a.v) + a_turn.dot(a.w);
+  return b ? linear.dot(b->v) + b_turn.dot(b->w) - of_a : -of_a;
+}
+
+}  // namespace
+
+void JointSolver::add(const JointModel& model, std::uint32_t a, std::uint32_t b, std::uint32_t index,
+                      const ContactRecord& record) {
+  if (used_ == work_.size()) work_.emplace_back();
+  Work& work = work_[used_++];
+  work.model = &model;
+  work.a = a;
+  work.b = b;
+  work.index = index;
+  work.linear = vec(record.points[0].arm_a);
+  work.angular = vec(record.points[0].arm_b);
+  work.extra = {record.points[0].impulse, record.friction[0], record.friction[1], record.friction[2], record.twist};
+}
+
+void JointSolver::store(std::span<ContactRecord> records) const {
+  for (const Work& work : std::span(work_).first(used_)) {
+    ContactRecord& record = records[work.index];
+    put(work.linear, record.points[0].arm_a);
+    put(work.angular, record.points[0].arm_b);
+    record.points[0].impulse = work.extra[kLower];
+    for (int i = 0; i < 3; ++i) record.friction[i] = work.extra[static_cast<std::size_t>(kUpper + i)];
+    record.twist = work.extra[kCone];
+  }
+}
+
+void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const {
+  const JointModel& model = *work.model;
+  const Joint& joint = *model.joint;
+  const End a = end_of(bodies[work.a], model.at_a);
+  const End b = work.b == kNoBody ? end_of(model.at_b) : end_of(bodies[work.b], model.at_b);
+  const double linear_mass = a.inverse_mass + b.inverse_mass;
+  const Vec3 apart = b.place - a.place;
+  const Vec3 half = work.b == kNoBody ? Vec3(Vec3::Zero()) : Vec3(0.5 * apart);
+  // Both bodies are pushed in one place, half way between (of a static one it does not matter): turning momentum is kept.
+  const auto linear_row = [&](const Vec3& direction) {
+    Row row{direction, (a.arm + half).cross(direction), (b.arm - half).cross(direction), {}, {}};
+    row.a_spin = a.inverse_inertia * row.a_turn;
+    row.b_spin = b.inverse_inertia * row.b_turn;
+    return row;
+  };
+  const auto angular_row = [&](const Vec3& axis) {
+    return Row{Vec3::Zero(), axis, axis, a.inverse_inertia * axis, b.inverse_inertia * axis};
+  };
+  const auto response = [&](const Row& l, const Row& r) {
+    return linear_mass * l.linear.dot(r.linear) + l.a_turn.dot(r.a_spin) + l.b_turn.dot(r.b_spin);
+  };
+  const Mat3 axes_a = a.frame.toRotationMatrix();
+  work.held = 0;
+  const auto hold = [&](const Row& row, double error) {
+    work.row[work.held] = row;
+    work.error[work.held++] = error;
+  };
+  std::fill_n(work.used, static_cast<int>(kExtras), false);
+  const auto extra = [&](Extra which, const Row& row, double error) {
+    work.used[which] = true;
+    work.along[which] = row;
+    work.extra_mass[which] = 1 / response(row, row);
+    work.extra_error[which] = error;
+  };
+  // Limits, motor and spring along one freedom at `position`.
+  const auto free_along = [&](const Row& row, double position) {
+    if (joint.limits) {
+      extra(kLower, row, position - joint.limits->lower);
+      extra(kUpper, row, position - joint.limits->upper);
+    }
+    if (joint.motor) extra(kMotor, row, 0);
+    if (joint.spring)
+      extra(kSpring, row, position - (joint.limits ? 0.5 * (joint.limits->lower + joint.limits->upper) : 0.0));
+  };
+  // The turn of b against a, as a quaternion in a's frame with w >= 0.
+  Quat turn = a.frame.conjugate() * b.frame;
+  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+
+  if (joint.kind == JointKind::kFixed || joint.kind == JointKind::kBall || joint.kind == JointKind::kHinge)
+    for (int i = 0; i < 3; ++i) hold(linear_row(Vec3::Unit(i)), apart[i]);
+  switch (joint.kind) {
+    case JointKind::kFixed: {
+      const Vec3 error = axes_a * (2 * turn.vec());
+      for (int i = 0; i < 3; ++i) hold(angular_row(Vec3::Unit(i)), error[i]);
+      break;
+    }
+    case JointKind::kBall: {
+      const Vec3 z_a = axes_a.col(2), z_b = b.frame * Vec3::UnitZ();
+      if (joint.cone_limit) {
+        const Vec3 cross = z_a.cross(z_b);
+        const double sine = cross.norm();
+        // Anti-parallel, or parallel: any axis across will do.
+        const Vec3 axis = sine > 1e-9 ? Vec3(cross / sine) : Vec3(axes_a.col(0));
+        extra(kCone, angular_row(axis), angle_of(sine, z_a.dot(z_b)) - *joint.cone_limit);
+      }
+      if (joint.limits) {
+        const double twist = 2 * angle_of(turn.z(), turn.w());
+        const Row row = angular_row(z_b);
+        extra(kLower, row, twist - joint.limits->lower);
+        extra(kUpper, row, twist - joint.limits->upper);
+      }
+      break;
+    }
+    case JointKind::kHinge: {
+      const Vec3 error = axes_a.col(2).cross(Vec3(b.frame * Vec3::UnitZ()));
+      for (int i = 0; i < 2; ++i) hold(angular_row(axes_a.col(i)), error.dot(axes_a.col(i)));
+      free_along(angular_row(axes_a.col(2)), 2 * angle_of(turn.z(), turn.w()));
+      break;
+    }
+    case JointKind::kSlider: {
+      const Vec3 error = axes_a * (2 * turn.vec());
+      for (int i = 1; i < 3; ++i) hold(linear_row(axes_a.col(i)), apart.dot(axes_a.col(i)));
+      for (int i = 0; i < 3; ++i) hold(angular_row(Vec3::Unit(i)), error[i]);
+      free_along(linear_row(axes_a.col(0)), apart.dot(axes_a.col(0)));
+      break;
+    }
+    case JointKind::kDistance: {
+      const double length = apart.norm();
+      const Row row = linear_row(length > 1e-9 ? Vec3(apart / length) : Vec3(Vec3::UnitZ()));
+      if (joint.limits && joint.limits->lower == joint.limits->upper)
+        hold(row, length - joint.limits->lower);
+      else
+        free_along(row, length);
+      break;
+    }
+  }
+
+  for (int i = 0; i < work.held; ++i)
+    for (int j = 0; j <= i; ++j) {
+      double sum = response(work.row[i], work.row[j]);
+      for (int k = 0; k < j; ++k) sum -= work.factor[i][k] * work.factor[j][k];
+      work.factor[i][j] = i == j ? std::sqrt(std::max(sum, 1e-300)) : sum / work.factor[j][j];
+    }
+}
+
+void JointSolver::begin(std::span<MovingBody> bodies, double h) {
+  if (used_ == 0) return;
+  h_ = h;
+  stiff_ = soften(kJointHertzPerSubstepRate / h, kJointDampingRatio, h);
+  for (Work& work : std::span(work_).first(used_)) {
+    prepare(work, bodies);
+    MovingBody& a = bodies[work.a];
+    MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
+    const auto push = [&](const Row& row, double impulse) {
+      a.v -= (a.inverse_mass * impulse) * row.linear;
+      a.w -= impulse * row.a_spin;
+      if (!b) return;
+      b->v += (b->inverse_mass * impulse) * row.linear;
+      b->w += impulse * row.b_spin;
+    };
+    // What was carried, along the rows as they are now.
+    Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+    for (int i = 0; i < work.held; ++i) {
+      const Row& row = work.row[i];
+      const bool pushes = !row.linear.isZero(0);
+      const double impulse = pushes ? row.linear.dot(work.linear) : row.a_turn.dot(work.angular);
+      push(row, impulse);
+      (pushes ? linear : angular) += impulse * (pushes ? row.linear : row.a_turn);
+    }
+    work.linear = linear;
+    work.angular = angular;
+    for (std::size_t e = 0; e < kExtras; ++e) {
+      if (work.used[e])
+        push(work.along[e], work.extra[e]);
+      else
+        work.extra[e] = 0;
+    }
+  }
+}
+
+void JointSolver::pass(std::span<MovingBody> bodies, bool bias) {
+  for (Work& work : std::span(work_).first(used_)) {
+    if (!bias) prepare(work, bodies);  // they have moved
+    solve(work, bodies, bias);
+  }
+}
+
+void JointSolver::solve(Work& work, std::span<MovingBody> bodies, bool bias) const {
+  const Joint& joint = *work.model->joint;
+  MovingBody& a = bodies[work.a];
+  MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
+  const auto push = [&](const Row& row, double impulse) {
+    a.v -= (a.inverse_mass * impulse) * row.linear;
+    a.w -= impulse * row.a_spin;
+    if (!b) return;
+    b->v += (b->inverse_mass * impulse) * row.linear;
+    b->w += impulse * row.b_spin;
+  };
+  const auto speed_along = [&](const Row& row) { return speed(row.linear, row.a_turn, row.b_turn, a, b); };
+  const auto add = [&](Extra which, const Softness& soft, double wanted, double least, double most) {
+    const Row& row = work.along[which];
+    double& sum = work.extra[static_cast<std::size_t>(which)];
+    const double change =
+        -soft.mass_scale * work.extra_mass[which] * (speed_along(row) + wanted) - soft.impulse_scale * sum;
+    const double now = std::clamp(sum + change, least, most);
+    push(row, now - sum);
+    sum = now;
+  };
+  constexpr Softness kRigid{0, 1, 0};
+  const bool holds_softly = joint.spring && (joint.kind == JointKind::kFixed || joint.kind == JointKind::kBall);
+
+  if (work.used[kSpring]) {
+    const Softness soft = soften(joint.spring->frequency, joint.spring->damping_ratio, h_);
+    add(kSpring, soft, soft.bias_rate * work.extra_error[kSpring], -HUGE_VAL, HUGE_VAL);
+  }
+  if (work.used[kMotor])
+    add(kMotor, kRigid, -joint.motor->target_velocity, -joint.motor->max_effort * h_, joint.motor->max_effort * h_);
+  // One-sided: what is within its limits may reach them within the sub-step, no more.
+  const auto limit = [&](Extra which, double sign) {
+    if (!work.used[which]) return;
+    const double error = work.extra_error[which];
+    const bool within = sign * error > 0;
+    const Softness& soft = bias && !within ? stiff_ : kRigid;
+    const double wanted = within ? error / h_ : soft.bias_rate * error;
+    if (sign > 0)
+      add(which, soft, wanted, 0, HUGE_VAL);
+    else
+      add(which, soft, wanted, -HUGE_VAL, 0);
+  };
+  limit(kLower, 1);
+  limit(kUpper, -1);
+  limit(kCone, -1);
+
+  if (work.held == 0) return;
+  const Softness soft = holds_softly ? soften(joint.spring->frequency, joint.spring->damping_ratio, h_)
+                        : bias       ? stiff_
+                                     : kRigid;
+  double x[kHeld];
+  for (int i = 0; i < work.held; ++i) {  // forward ...
+    double sum = speed_along(work.row[i]) + soft.bias_rate * work.error[i];
+    for (int k = 0; k < i; ++k) sum -= work.factor[i][k] * x[k];
+    x[i] = sum / work.factor[i][i];
+  }
+  for (int i = work.held - 1; i >= 0; --i) {  // ... and back
+    double sum = x[i];
+    for (int k = i + 1; k < work.held; ++k) sum -= work.factor[k][i] * x[k];
+    x[i] = sum / work.factor[i][i];
+  }
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+  for (int i = 0; i < work.held; ++i) {
+    const Row& row = work.row[i];
+    const bool pushes = !row.linear.isZero(0);
+    const double before = pushes ? row.linear.dot(work.linear) : row.a_turn.dot(work.angular);
+    const double impulse = -soft.mass_scale * x[i] - soft.impulse_scale * before;
+    push(row, impulse);
+    (pushes ? linear : angular) += impulse * (pushes ? row.linear : row.a_turn);
+  }
+  work.linear += linear;
+  work.angular += angular;
+}
+
+}  // namespace soda::physics
