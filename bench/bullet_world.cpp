@@ -114,7 +114,8 @@ struct BulletWorld::World {
     const auto end = [&](BodyId id, const Pose& frame) -> std::pair<btRigidBody*, btTransform> {
       for (std::size_t i = 0; i < bodies.size(); ++i)
         if (scene.bodies[i].id == id)
-          return {bodies[i].get(), to_bullet(Pose{frame.position - scene.bodies[i].inertial.centre, frame.orientation})};
+          return {bodies[i].get(),
+                  to_bullet(Pose{frame.position - scene.bodies[i].inertial.centre, frame.orientation})};
       return {nullptr, to_bullet(frame)};
     };
     const auto [a, in_a] = end(joint.a, joint.frame_a);

@@ -51,12 +51,6 @@ void plot(const Options& options, const std::string& name, const std::string& sc
 
 std::filesystem::path soda_program() { return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "soda"; }
 
-double cpu_seconds() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

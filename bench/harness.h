@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "bench/clocks.h"
+
 namespace soda::bench {
 
 struct Options {
@@ -53,7 +55,6 @@ void plot(const Options& options, const std::string& name, const std::string& sc
 // The command beside this program.
 std::filesystem::path soda_program();
 
-double cpu_seconds();  // of this thread
 double median(std::vector<double> values);
 
 // Median CPU seconds per call of f, over enough calls to be measurable.

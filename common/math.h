@@ -32,8 +32,8 @@ struct Aabb {
 // gives the same bits (glibc's choose a variant by CPU). Absolute error below 1e-15 for |angle| <= 1000 rad.
 void sin_cos(double angle, double& sine, double& cosine);
 
-// The angle, in (-pi, pi], of the direction (cosine, sine), which need not be of unit length; 0 of no direction. Likewise
-// of IEEE operations only; error below 1e-15.
+// The angle, in (-pi, pi], of the direction (cosine, sine), which need not be of unit length; 0 of no direction.
+// Likewise of IEEE operations only; error below 1e-15.
 double angle_of(double sine, double cosine);
 
 // The rotation exp(v): about v by |v| radians.

@@ -40,16 +40,6 @@ std::vector<Setting> settings_of(const Case& c, bool quick) {
 
 }  // namespace
 
-std::vector<Case> all_cases() {
-  std::vector<Case> all;
-  for (const auto theme : {free_cases, bounce_cases, friction_cases, stack_cases, masonry_cases, heap_cases, far_cases,
-                           joint_cases})
-    for (Case& c : theme()) all.push_back(std::move(c));
-  const auto number = [](const Case& c) { return std::stoi(c.id + 1); };
-  std::sort(all.begin(), all.end(), [&](const Case& l, const Case& r) { return number(l) < number(r); });
-  return all;
-}
-
 void accuracy(const Options& options, Headline& headline) {
   const std::vector<Case> cases = chosen_cases(options.cases);
   std::vector<std::pair<const Case*, Verdict>> table;

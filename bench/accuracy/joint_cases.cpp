@@ -147,16 +147,17 @@ constexpr double kLink = 0.2;  // m
 Scene chain(double load, bool level) {
   SceneBuilder builder("chain");
   const Vec3 along = level ? Vec3::UnitX() : Vec3(-Vec3::UnitZ());
+  const Vec3 pivot(0, 0, (kLinks + 2) * kLink);  // so that the energy is that of the fall
   const Quat turn = level ? rotation_of(Vec3(0, M_PI / 2, 0)) : Quat::Identity();
   for (int i = 0; i < kLinks; ++i) {
     const Capsule link{0.04, kLink - 0.08};
-    builder.add(link, (i + 0.5) * kLink * along, turn).inertial = with_mass(mass_of(link, 1000), 1);
+    builder.add(link, pivot + (i + 0.5) * kLink * along, turn).inertial = with_mass(mass_of(link, 1000), 1);
   }
   const Box cube{Vec3(0.4, 0.4, 0.4)};
-  builder.add(cube, (kLinks * kLink + 0.2) * along).inertial = with_mass(mass_of(cube, 1000), load);
-  builder.add_joint(JointKind::kBall, 0, SceneBuilder::kWorld, Vec3::Zero());
+  builder.add(cube, pivot + (kLinks * kLink + 0.2) * along).inertial = with_mass(mass_of(cube, 1000), load);
+  builder.add_joint(JointKind::kBall, 0, SceneBuilder::kWorld, pivot);
   for (std::size_t i = 1; i <= kLinks; ++i)
-    builder.add_joint(JointKind::kBall, i - 1, i, static_cast<double>(i) * kLink * along);
+    builder.add_joint(JointKind::kBall, i - 1, i, pivot + static_cast<double>(i) * kLink * along);
   return builder.finish();
 }
 

@@ -82,7 +82,8 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
   const double linear_mass = a.inverse_mass + b.inverse_mass;
   const Vec3 apart = b.place - a.place;
   const Vec3 half = work.b == kNoBody ? Vec3(Vec3::Zero()) : Vec3(0.5 * apart);
-  // Both bodies are pushed in one place, half way between (of a static one it does not matter): turning momentum is kept.
+  // Both bodies are pushed in one place, half way between (of a static one it does not matter): turning momentum is
+  // kept.
   const auto linear_row = [&](const Vec3& direction) {
     Row row{direction, (a.arm + half).cross(direction), (b.arm - half).cross(direction), {}, {}};
     row.a_spin = a.inverse_inertia * row.a_turn;

@@ -35,7 +35,7 @@ class JointSolver {
   struct Work {
     const JointModel* model;
     std::uint32_t a, b, index;
-    Vec3 linear, angular;                // N s, N m s on b, world axes, of this sub-step
+    Vec3 linear, angular;               // N s, N m s on b, world axes, of this sub-step
     std::array<double, kExtras> extra;  // likewise, along the extra rows
     int held;
     Row row[kHeld];

@@ -28,7 +28,8 @@ Pose pose_at(const Body& body, double time) {
 
 void follow(const Body& body, std::uint32_t steps, double dt, BodyState& state) {
   const Pose now = pose_at(body, steps * dt), next = pose_at(body, (steps + 1.0) * dt);
-  const Vec3 x = now.position + now.orientation * body.inertial.centre, x_next = next.position + next.orientation * body.inertial.centre;
+  const Vec3 x = now.position + now.orientation * body.inertial.centre,
+             x_next = next.position + next.orientation * body.inertial.centre;
   state.set_x(x);
   state.set_q(now.orientation);
   state.set_v((x_next - x) / dt);

@@ -1,5 +1,5 @@
-// Bodies that follow a prescribed motion. Their clock, the number of steps since they were there first, is part of their
-// state: BodyState::quiet_steps, which they need for nothing else.
+// Bodies that follow a prescribed motion. Their clock, the number of steps since they were there first, is part of
+// their state: BodyState::quiet_steps, which they need for nothing else.
 #pragma once
 
 #include "common/body_state.h"

@@ -161,9 +161,7 @@ const BodyModel* Model::find(BodyId id) const {
   return &bodies_[index_[id]];
 }
 
-const StaticModel* Model::find_static(BodyId id) const {
-  return id == kWorldBody ? &world_ : find_by_id(statics_, id);
-}
+const StaticModel* Model::find_static(BodyId id) const { return id == kWorldBody ? &world_ : find_by_id(statics_, id); }
 
 BodyState Model::state_of(const Body& body) const {
   BodyState s;

@@ -30,7 +30,7 @@ struct BodyModel {
   double linear_damping = 0, angular_damping = 0;  // 1/s
   std::uint32_t first_child = 0, children = 0;     // range in ShapeStore::children
   double radius = 0;                               // m, of the sphere about the centre of mass that holds all shapes
-  double reach = 0;         // m, likewise, with what its joints reach for
+  double reach = 0;                                // m, likewise, with what its joints reach for
   double inner_extent = 0;  // m, smallest half extent of any child: the scale for recycling contacts
   const Drive* drive = nullptr;
   const Body* kinematic = nullptr;  // one with a prescribed motion; its inverse mass and inertia are 0

@@ -101,12 +101,11 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
     return l.a_turn.dot(r.a_spin) + (b ? l.b_turn.dot(r.b_spin) : 0.0);
   };
 
-  // Bodies at rest on each other keep their frozen places, as if they were one: that is what holds tall stacks up. Others
-  // are pushed in one place, half way between: angular momentum is kept.
+  // Bodies at rest on each other keep their frozen places, as if they were one: that is what holds tall stacks up.
+  // Others are pushed in one place, half way between: angular momentum is kept.
   Vec3 shift = Vec3::Zero();
   if (b) {
-    const Vec3 slip =
-        b->v + b->w.cross(vec(record.points[0].arm_b)) - a.v - a.w.cross(vec(record.points[0].arm_a));
+    const Vec3 slip = b->v + b->w.cross(vec(record.points[0].arm_b)) - a.v - a.w.cross(vec(record.points[0].arm_a));
     if (slip.squaredNorm() > kMovingSpeed * kMovingSpeed) {
       shift = 0.5 * (b_minus_a - vec(record.offset));
       shift -= normal.dot(shift) * normal;

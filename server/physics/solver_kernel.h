@@ -12,8 +12,8 @@
 namespace soda::physics {
 
 constexpr int kLanes = 4;
-// One number of each of four constraints. Their alignment is said, because it must not depend on the instruction set that
-// a file is compiled for. Compilers without the instructions take two or four apart.
+// One number of each of four constraints. Their alignment is said, because it must not depend on the instruction set
+// that a file is compiled for. Compilers without the instructions take two or four apart.
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double)), aligned(kLanes * sizeof(double))));
 struct Lanes3 {
   Lanes x, y, z;

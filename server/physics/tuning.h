@@ -28,9 +28,9 @@ constexpr double kStaticDampingFactor = 0.5;  // ... and less damped
 constexpr double kPushOutSpeed = 3;           // m/s, limit for removing penetration
 constexpr double kMovingSpeed = 0.01;         // m/s; faster against each other, angular momentum is kept to the last
 constexpr double kRestitutionThreshold = 1;   // m/s; slower approaches do not bounce
-constexpr double kImpactReach = 1.001;        // of what is covered in a sub-step: whoever just touches at its end strikes
-constexpr int kImpactIterations = 16;         // over the points of one manifold
-constexpr int kMostImpactRounds = 64;         // over an island, in one sub-step; what strikes later is stopped
+constexpr double kImpactReach = 1.001;  // of what is covered in a sub-step: whoever just touches at its end strikes
+constexpr int kImpactIterations = 16;   // over the points of one manifold
+constexpr int kMostImpactRounds = 64;   // over an island, in one sub-step; what strikes later is stopped
 
 // ---- joints: stiffer than contacts, since both signs of an impulse are allowed
 constexpr double kJointHertzPerSubstepRate = 0.25;

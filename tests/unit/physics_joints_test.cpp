@@ -67,8 +67,8 @@ TEST(Joint, APendulumSwingsWithItsPeriodAndKeepsItsEnergy) {
     ASSERT_EQ(turns, 10);
     EXPECT_NEAR(turned / 240 / turns, period, 0.002 * period);
     EXPECT_NEAR(lowest, -1, 1e-4);
-    EXPECT_NEAR(energy(world.model, world.set) / world.model.find(1)->mass,
-                -kG * std::cos(angle), 0.01 * kG * (1 - std::cos(angle)));
+    EXPECT_NEAR(energy(world.model, world.set) / world.model.find(1)->mass, -kG * std::cos(angle),
+                0.01 * kG * (1 - std::cos(angle)));
   }
 }
 

@@ -166,8 +166,8 @@ const std::vector<Case>& cases() {
       {"piles", piles_case, 400, true, true},       {"heap", heap_case, 300, false, false},
       {"city", city_case, 240, false, false},       {"towers", towers_case, 240, true, true},
       {"dominoes", dominoes_case, 420, true, true}, {"cluster", cluster_case, 240, false, false},
-      {"machines", machines_case, 300, true, true},
-      {"shapes", shapes_case, 420, true, true},     {"wide", wide_case, 460, true, true},
+      {"machines", machines_case, 300, true, true}, {"shapes", shapes_case, 420, true, true},
+      {"wide", wide_case, 460, true, true},
   };
   return all;
 }
