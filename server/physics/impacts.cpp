@@ -19,17 +19,18 @@ class Pair {
   Pair(const Batch& batch, int lane, std::span<MovingBody> bodies)
       : a_(bodies[batch.a[lane]]),
         b_(batch.b[lane] == kNoBody ? nullptr : &bodies[batch.b[lane]]),
-        moved_(b_ ? Vec3(b_->moved - a_.moved) : Vec3(-a_.moved)) {}
+        moved_(b_ ? Vec3(b_->moved - a_.moved) : Vec3(-a_.moved)),
+        on_a_(batch.moves_on_a[lane]) {}
 
-  // With both bodies' arms to one place, half way between theirs.
+  // With both bodies' arms to one place, between theirs.
   Line line(const Row& row, int lane, const Vec3& direction) const {
     Line line{direction, get(row.a_turn, lane), get(row.b_turn, lane), get(row.a_spin, lane), get(row.b_spin, lane)};
     if (!b_) return line;
-    const Vec3 shift = 0.5 * moved_.cross(direction);
-    line.a_turn += shift;
-    line.b_turn -= shift;
-    line.a_spin += a_.inverse_inertia * shift;
-    line.b_spin -= b_->inverse_inertia * shift;
+    const Vec3 shift = moved_.cross(direction);
+    line.a_turn += on_a_ * shift;
+    line.b_turn -= (1 - on_a_) * shift;
+    line.a_spin += on_a_ * (a_.inverse_inertia * shift);
+    line.b_spin -= (1 - on_a_) * (b_->inverse_inertia * shift);
     return line;
   }
   double separation(const BatchPoint& point, int lane, const Vec3& normal) const {
@@ -56,7 +57,8 @@ class Pair {
  private:
   MovingBody& a_;
   MovingBody* const b_;
-  const Vec3 moved_;  // m, of b against a since the start of the step
+  const Vec3 moved_;   // m, of b against a since the start of the step
+  const double on_a_;  // see Surface::moves_on_a
 };
 
 // How much of an impulse may be applied so that its work is not positive: with impulse s p it is s b + s^2 (w - b).

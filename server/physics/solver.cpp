@@ -65,6 +65,7 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
   batch.bounces = batch.bounces || surface.restitution > 0;
   batch.friction[lane] = surface.friction;
   batch.restitution[lane] = surface.restitution;
+  batch.moves_on_a[lane] = surface.moves_on_a;
   batch.bias_rate[lane] = soft.bias_rate;
   batch.mass_scale[lane] = soft.mass_scale;
   batch.impulse_scale[lane] = soft.impulse_scale;
@@ -175,10 +176,10 @@ void IslandSolver::settle_torques(std::span<MovingBody> bodies) const {
     const Batch& batch = batches_[i];
     for (int l = 0; l < kLanes; ++l) {
       if (batch.b[l] == kNoBody) continue;
-      const Vec3 half = 0.5 * get(batch.owed, l);
+      const Vec3 owed = get(batch.owed, l);
       MovingBody &a = bodies[batch.a[l]], &b = bodies[batch.b[l]];
-      a.w -= a.inverse_inertia * half;
-      b.w -= b.inverse_inertia * half;
+      a.w -= a.inverse_inertia * (batch.moves_on_a[l] * owed);
+      b.w -= b.inverse_inertia * ((1 - batch.moves_on_a[l]) * owed);
     }
   }
 }

@@ -48,7 +48,7 @@ struct Batch {
   std::uint32_t points;                  // the largest of these
   bool bounces;                          // some restitution is not 0
   Lanes inverse_mass_a, inverse_mass_b;  // 1/kg
-  Lanes friction, restitution;
+  Lanes friction, restitution, moves_on_a;
   Lanes bias_rate, mass_scale, impulse_scale;  // of soft contacts
   Lanes3 normal, tangent[2];
   BatchPoint point[4];

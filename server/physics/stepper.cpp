@@ -344,6 +344,16 @@ void Stepper::find_surface(const ContactRecord& contact, const Ends& ends, Surfa
     surface.fixed = nullptr;
     friction = b.friction, restitution = b.restitution;
   }
+  const auto kind_of = [&](std::uint32_t first, std::uint32_t child) {
+    return model_.shapes().children(first + child, 1)[0].kind;
+  };
+  const auto is_round = [](ShapeKind kind) { return kind == ShapeKind::kSphere || kind == ShapeKind::kCapsule; };
+  surface.moves_on_a = 0.5;
+  if (ends.b != kStaticSlot) {
+    const bool a_rolls = is_round(kind_of(a.first_child, contact.part >> 20));
+    const bool b_rolls = is_round(kind_of(moving_[island_slot_[ends.b]].model->first_child, contact.part >> 8 & 0xfff));
+    if (a_rolls != b_rolls) surface.moves_on_a = a_rolls ? 0 : 1;
+  }
   surface.friction = std::sqrt(a.friction * friction);
   surface.restitution = std::max(a.restitution, restitution);
 }
