@@ -17,6 +17,8 @@ struct Options {
   bool quick = false;              // smaller and shorter: to see that it works, not to measure
   int rounds = 0;                  // repetitions; 0: the command's own choice
   std::vector<std::string> cases;  // of `accuracy`; empty: all
+  std::vector<unsigned> worlds;    // of `accuracy`: compare bits on so many worlds instead
+  bool distribution = false;       // of `accuracy`: the error of distribution instead
 };
 
 // The headline numbers of a run: printed at the end and written as one flat JSON object, in the order added.

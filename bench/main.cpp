@@ -36,11 +36,17 @@ int main(int argc, char** argv) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
     sub->add_option("--out", options.out, "directory for CSV files and pictures");
     sub->add_option("--json", options.json, "file for the headline numbers");
-    if (command.has_cases)
+    if (command.has_cases) {
       sub->add_option("CASE", options.cases, "such as A11; without any: all");
-    else
+      sub->add_option("--worlds", options.worlds,
+                      "compare the bits of the cases on so many worlds (several numbers) with one")
+          ->check(CLI::Range(2, 64));
+      sub->add_flag("--distribution", options.distribution,
+                    "the error of distribution, over 30 seeds of a chaotic scene");
+    } else {
       sub->add_option("--rounds", options.rounds, "repetitions of which the median is taken")
           ->check(CLI::Range(1, 100));
+    }
     sub->add_flag("--quick", options.quick, "small and short: to see that it works, not to measure");
   }
   CLI11_PARSE(app, argc, argv);

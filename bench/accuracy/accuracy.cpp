@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "bench/accuracy/distribution.h"
 #include "bench/accuracy/report.h"
 #include "bench/commands.h"
 
@@ -41,7 +42,9 @@ std::vector<Setting> settings_of(const Case& c, bool quick) {
 }  // namespace
 
 void accuracy(const Options& options, Headline& headline) {
+  if (options.distribution) return distribution(options, headline);
   const std::vector<Case> cases = chosen_cases(options.cases);
+  if (!options.worlds.empty()) return compare_worlds(cases, options.worlds, headline);
   std::vector<std::pair<const Case*, Verdict>> table;
   for (const Case& c : cases) {
     const double start = cpu_seconds();

@@ -54,6 +54,16 @@ std::string list_shapes(const std::array<std::size_t, std::variant_size_v<Geomet
   return text.empty() ? "none" : text;
 }
 
+std::string list_joints(const Scene& scene) {
+  std::array<std::size_t, 5> counts{};
+  for (const Joint& joint : scene.joints) ++counts[static_cast<std::size_t>(joint.kind)];
+  std::string text;
+  for (std::size_t k = 0; k < counts.size(); ++k)
+    if (counts[k] > 0)
+      text += (text.empty() ? "" : ", ") + std::to_string(counts[k]) + " " + name_of(static_cast<JointKind>(k));
+  return text.empty() ? "none" : text;
+}
+
 std::string box_text(const std::optional<Aabb>& box) {
   if (!box) return "unbounded";
   char text[160];
@@ -82,7 +92,7 @@ std::vector<std::string> doubts(const Scene& scene) {
 
 void print_summary(const Scene& scene, const std::string& file) {
   std::array<std::size_t, std::variant_size_v<Geometry>> moving{}, fixed{};
-  std::size_t statics = 0, driven = 0, compounds = 0;
+  std::size_t statics = 0, driven = 0, kinematic = 0, compounds = 0;
   double mass = 0, lightest = HUGE_VAL, heaviest = 0, fastest = 0;
   std::optional<Aabb> where;
   for (const Body& body : scene.bodies) {
@@ -94,6 +104,7 @@ void print_summary(const Scene& scene, const std::string& file) {
     }
     compounds += body.shapes.size() > 1;
     driven += body.drive.has_value();
+    kinematic += body.motion.has_value();
     mass += body.inertial.mass;
     lightest = std::min(lightest, body.inertial.mass);
     heaviest = std::max(heaviest, body.inertial.mass);
@@ -102,7 +113,8 @@ void print_summary(const Scene& scene, const std::string& file) {
   }
   const std::size_t dynamic = scene.bodies.size() - statics;
   std::printf("%s: \"%s\" is a valid scene\n", file.c_str(), scene.name.c_str());
-  std::printf("  dynamic bodies  %zu (%zu driven, %zu of several shapes)\n", dynamic, driven, compounds);
+  std::printf("  dynamic bodies  %zu (%zu driven, %zu kinematic, %zu of several shapes)\n", dynamic, driven, kinematic,
+              compounds);
   std::printf("    shapes        %s\n", list_shapes(moving).c_str());
   if (dynamic > 0) {
     std::printf("    masses        %.6g .. %.6g kg, %.6g kg in all\n", lightest, heaviest, mass);
@@ -111,6 +123,7 @@ void print_summary(const Scene& scene, const std::string& file) {
   }
   std::printf("  static bodies   %zu\n", statics);
   std::printf("    shapes        %s\n", list_shapes(fixed).c_str());
+  std::printf("  joints          %s\n", list_joints(scene).c_str());
   std::printf("  gravity         %.6g %.6g %.6g m/s^2\n", scene.gravity.x(), scene.gravity.y(), scene.gravity.z());
   std::printf("  step            %.9g s, %u sub-steps, sleeping %s, at most %.6g m/s\n", scene.dt, scene.substeps,
               scene.sleeping ? "on" : "off", scene.max_speed);

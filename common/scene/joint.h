@@ -64,8 +64,8 @@ void turn_round(Joint& joint);
 // scenes; the bodies are there already, ascending by id. What cannot be put right is left for the checks.
 void order_ends(const Scene& scene, Joint& joint);
 
-// How far apart two places that a joint keeps together may come, m, beyond what its limits allow: worlds look for a
-// joint's other body no further away. A joint that is torn further does nothing until its bodies are near again.
+// How far each end looks for the other, m, beyond what the joint's limits allow: worlds look for a joint's other body no
+// further away. A joint that is torn further than both ends look does nothing until its bodies are near again.
 double joint_slack(const Scene& scene, const Joint& joint);
 
 // Of each end: the sphere about its place, radius in m, within which the other end's place is looked for.
