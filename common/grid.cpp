@@ -121,7 +121,8 @@ int neighbour_range(const Scene& scene, const Grid& grid) {
   for (const Body& body : scene.bodies)
     if (!body.is_static) radius = std::max(radius, reach_radius(scene, body));
   const double reach = 2 * radius + scene.max_speed * scene.dt + kMargin;
-  return std::max(2, static_cast<int>(std::ceil(reach / grid.edge + 0.5)) + 1);
+  const double most = std::max({grid.size[0], grid.size[1], grid.size[2]}) + 2.0;
+  return std::max(2, static_cast<int>(std::ceil(std::min(reach / grid.edge, most) + 0.5)) + 1);
 }
 
 double largest_later_radius(const Scene& scene, const Grid& grid) {

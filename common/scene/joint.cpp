@@ -95,6 +95,7 @@ void finish_joints(Scene& scene) {
   for (const Joint& joint : scene.joints) {
     Body* const a = find(scene, joint.a);
     Body* const b = find(scene, joint.b);
+    if (!b || b->is_static) continue;  // what does not move is known to all
     const auto reach = [](Body* body, const Pose& frame, double beyond) {
       if (!body || body->is_static) return;
       body->joint_reach = std::max(body->joint_reach, (frame.position - body->inertial.centre).norm() + beyond);

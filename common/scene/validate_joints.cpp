@@ -58,6 +58,7 @@ MaybeProblem ends_problem(const Scene& scene, const Joint& joint) {
   if (joint.b != kWorldBody && !b) return Problem{"body_b", "names no body of this scene: " + std::to_string(joint.b)};
   if (a == b) return Problem{"body_b", "must be another body than body_a"};
   if (b && !b->is_static && joint.b < joint.a) return Problem{"body_b", "must have a higher id than body_a"};
+  if (a->motion && (!b || b->is_static || b->motion)) return Problem{"", "neither of its bodies can be moved by it"};
   const Vec3 place_a = (a->pose * joint.frame_a).position;
   const Vec3 place_b = b ? (b->pose * joint.frame_b).position : joint.frame_b.position;
   const double apart = (place_a - place_b).norm(), most = joint_reach_a(scene, joint) + joint_reach_b(scene, joint);

@@ -20,7 +20,11 @@ class Pair {
       : a_(bodies[batch.a[lane]]),
         b_(batch.b[lane] == kNoBody ? nullptr : &bodies[batch.b[lane]]),
         moved_(b_ ? Vec3(b_->moved - a_.moved) : Vec3(-a_.moved)),
-        on_a_(batch.moves_on_a[lane]) {}
+        on_a_(batch.moves_on_a[lane]),
+        a_v_(a_.v),
+        a_w_(a_.w) {
+    if (b_) b_v_ = b_->v, b_w_ = b_->w;
+  }
 
   // With both bodies' arms to one place, between theirs.
   Line line(const Row& row, int lane, const Vec3& direction) const {
@@ -32,6 +36,11 @@ class Pair {
     line.a_spin += on_a_ * (a_.inverse_inertia * shift);
     line.b_spin -= (1 - on_a_) * (b_->inverse_inertia * shift);
     return line;
+  }
+  // Exactly as it was before anything was pushed.
+  void undo() {
+    a_.v = a_v_, a_.w = a_w_;
+    if (b_) b_->v = b_v_, b_->w = b_w_;
   }
   double separation(const BatchPoint& point, int lane, const Vec3& normal) const {
     return point.separation[lane] + normal.dot(moved_) - get(point.row.a_turn, lane).dot(a_.turned) +
@@ -59,6 +68,8 @@ class Pair {
   MovingBody* const b_;
   const Vec3 moved_;   // m, of b against a since the start of the step
   const double on_a_;  // see Surface::moves_on_a
+  const Vec3 a_v_, a_w_;
+  Vec3 b_v_ = Vec3::Zero(), b_w_ = Vec3::Zero();
 };
 
 // How much of an impulse may be applied so that its work is not positive: with impulse s p it is s b + s^2 (w - b).
@@ -116,12 +127,20 @@ bool strike(const Batch& batch, int lane, std::span<MovingBody> bodies, double h
     first_order += impulse[k] * before[k];
   }
   const double kept = allowed(work, first_order);
+  if (!(kept > 0)) {  // no trace of it, however often it is tried
+    pair.undo();
+    return false;
+  }
   for (int k = 0; k < count; ++k) {
     if (kept < 1) pair.push(line[k], (kept - 1) * impulse[k]);
     pressed += kept * impulse[k];
   }
+  if (!(pressed > 0)) {
+    pair.undo();
+    return false;
+  }
   if (batch.friction[lane] > 0) rub(pair, batch, lane, pressed);
-  return pressed > 0;
+  return true;
 }
 
 }  // namespace

@@ -46,8 +46,9 @@ void limit_speed(MovingBody& body, double max_speed) {
 }  // namespace
 
 void begin_step(const BodyState& state, const BodyModel& model, MovingBody& body) {
-  body.v = state.v();
-  body.w = state.w();
+  // Never -0: whether it stays so would depend on what is solved in other lanes.
+  body.v = state.v() + Vec3::Zero();
+  body.w = state.w() + Vec3::Zero();
   body.moved = body.turned = Vec3::Zero();
   body.x = state.x();
   body.q = state.q();
@@ -141,7 +142,7 @@ bool end_step(MovingBody& body, const StepConstants& constants, BodyState& state
   state.set_q(body.q);
   state.set_v(body.v);
   state.set_w(body.w);
-  const double r = body.model->radius;
+  const double r = body.model->reach;
   const bool quiet = body.v.squaredNorm() < kSleepSpeed * kSleepSpeed &&
                      body.w.squaredNorm() * r * r < kSleepSpeed * kSleepSpeed && !body.model->drive;
   state.quiet_steps = quiet ? std::min(state.quiet_steps + 1, constants.quiet_steps_to_sleep) : 0;

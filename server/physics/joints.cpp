@@ -43,6 +43,16 @@ End end_of(const Pose& in_world) {
   return end;
 }
 
+// An angle as near to the middle of its limits as whole turns can bring it: so that what overshoots a limit is brought
+// back to that one.
+double unwound(double angle, const std::optional<JointLimits>& limits) {
+  constexpr double kPi = 3.14159265358979323846;
+  const double middle = limits ? 0.5 * (limits->lower + limits->upper) : 0;
+  if (angle - middle > kPi) return angle - 2 * kPi;
+  if (angle - middle < -kPi) return angle + 2 * kPi;
+  return angle;
+}
+
 double speed(const Vec3& linear, const Vec3& a_turn, const Vec3& b_turn, const MovingBody& a, const MovingBody* b) {
   const double of_a = linear.dot(a.v) + a_turn.dot(a.w);
   return b ? linear.dot(b->v) + b_turn.dot(b->w) - of_a : -of_a;
@@ -141,7 +151,7 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
         extra(kCone, angular_row(axis), angle_of(sine, z_a.dot(z_b)) - *joint.cone_limit);
       }
       if (joint.limits) {
-        const double twist = 2 * angle_of(turn.z(), turn.w());
+        const double twist = unwound(2 * angle_of(turn.z(), turn.w()), joint.limits);
         const Row row = angular_row(z_b);
         extra(kLower, row, twist - joint.limits->lower);
         extra(kUpper, row, twist - joint.limits->upper);
@@ -151,7 +161,7 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
     case JointKind::kHinge: {
       const Vec3 error = axes_a.col(2).cross(Vec3(b.frame * Vec3::UnitZ()));
       for (int i = 0; i < 2; ++i) hold(angular_row(axes_a.col(i)), error.dot(axes_a.col(i)));
-      free_along(angular_row(axes_a.col(2)), 2 * angle_of(turn.z(), turn.w()));
+      free_along(angular_row(axes_a.col(2)), unwound(2 * angle_of(turn.z(), turn.w()), joint.limits));
       break;
     }
     case JointKind::kSlider: {

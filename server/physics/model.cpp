@@ -79,9 +79,14 @@ void Model::add_joints() {
   };
   for (const Joint& joint : scene_.joints) {
     const bool moves = joint.b != kWorldBody && find(joint.b);
-    JointModel m{&joint, moves ? joint.b : kStaticBit | joint.b, kJointPart, centred(joint.frame_a, joint.a),
+    JointModel m{&joint,
+                 moves ? joint.b : kStaticBit | joint.b,
+                 kJointPart,
+                 joint_reach_a(scene_, joint) + joint_reach_b(scene_, joint),
+                 centred(joint.frame_a, joint.a),
                  centred(joint.frame_b, joint.b)};
-    ends.push_back({place_of(joint.a), {m.at_a.position, joint_reach_a(scene_, joint)}});
+    // What does not move is looked for at any distance.
+    if (moves) ends.push_back({place_of(joint.a), {m.at_a.position, joint_reach_a(scene_, joint)}});
     if (moves) ends.push_back({place_of(joint.b), {m.at_b.position, joint_reach_b(scene_, joint)}});
     owned.emplace_back(place_of(joint.a), m);
   }

@@ -44,6 +44,7 @@ struct JointModel {
   const Joint* joint;
   BodyId b;            // as in records: a dynamic body, or kStaticBit | a static one or kWorldBody
   std::uint32_t part;  // as in records
+  double reach;        // m, along each axis, beyond which its ends do not look for each other; of dynamic bodies
   Pose at_a, at_b;     // about the centres of mass, in the bodies' axes; of what does not move: in the world
 };
 

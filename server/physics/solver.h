@@ -23,8 +23,8 @@ struct Surface {
   // How much of the place of contact's motion against the bodies is against a: nothing of round bodies, which roll on
   // under it, and all of what they roll on.
   double moves_on_a = 0.5;
-  const StaticModel* fixed = nullptr;    // b, where it is static
-  const JointModel* joint = nullptr;     // or, instead of all of these, the joint that the record is of
+  const StaticModel* fixed = nullptr;  // b, where it is static
+  const JointModel* joint = nullptr;   // or, instead of all of these, the joint that the record is of
 };
 
 class IslandSolver {

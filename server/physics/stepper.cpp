@@ -77,6 +77,11 @@ constexpr std::size_t kGroupContacts = 256;  // of islands that are solved toget
 
 Aabb reach_box(const BodyState& state, const BodyModel& model, const Mat3& rotation, const Model& scene) {
   Aabb box = bounding_box(scene.shapes().children(model.first_child, model.children), state.x(), rotation);
+  // A turned box about a shape may stick out of the sphere about the body, by which indices know how far bodies reach.
+  const Vec3 x = state.x();
+  const double radius = model.radius * (1 + 1e-12);
+  box.min = box.min.cwiseMax((x.array() - radius).matrix());
+  box.max = box.max.cwiseMin((x.array() + radius).matrix());
   for (const Anchor& anchor : scene.anchors_of(model)) {
     const Vec3 place = state.x() + rotation * anchor.place;
     box.min = box.min.cwiseMin((place.array() - anchor.reach).matrix());
@@ -231,7 +236,11 @@ void Stepper::contacts_of(std::span<const BodyState> bodies, std::uint32_t body,
     if (may_collide(joined) && models_[body]->filter.admits(models_[partner]->filter) &&
         !(models_[body]->kinematic && models_[partner]->kinematic))
       updater_.update(self, party(other, partner), old, kSpeculativeDistance + approach * constants_.dt, out);
-    for (const JointModel& joint : joined) add_joint(state.id, joint, old, out);
+    for (const JointModel& joint : joined) {
+      const Vec3 apart =
+          other.x() + rotations_[partner] * joint.at_b.position - state.x() - rotations_[body] * joint.at_a.position;
+      if (apart.cwiseAbs().maxCoeff() <= joint.reach) add_joint(state.id, joint, old, out);
+    }
   }
   keep_sleeping_until(kStaticBit);
   if (!wanted) return;

@@ -322,7 +322,8 @@ void Timeline::store(Step step, std::vector<Table<Record>::Item>& items) {
   for (const auto& [slot, record] : items) {
     if (const Record* const old = entry.produced.get(slot)) {
       entry.hash -= old->hash;
-      redone += old->computed == step || step < newest();  // carried there from an earlier step: it was at rest
+      // That of a sleeping body was carried there from an earlier step.
+      redone += old->computed == step || (step < newest() && old->body.asleep());
     } else {
       ++entry.count;
     }

@@ -6,7 +6,7 @@
 #include "common/scene/scene_builder.h"
 #include "physics_scenes.h"
 
-namespace soda::physics::test {
+namespace soda::physics::test::joints {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -91,6 +91,45 @@ TEST(Joint, AHingeTurnsAboutItsAxisOnlyAndStopsAtItsLimits) {
   }
   EXPECT_GT(most, 0.99);
   EXPECT_LT(most, 1.01);
+}
+
+// A flap that falls open against a limit at half a turn, where angles begin anew.
+TEST(Joint, AHingeAtALimitOfHalfATurnStaysThere) {
+  SceneBuilder builder = awake("flap");
+  Body& flap = builder.add(Box{Vec3(1, 1, 0.1)}, Vec3(0.5, 0, 0));
+  flap.angular_velocity = Vec3(0, -6, 0);
+  flap.linear_velocity = Vec3(0, 0, 3);
+  Joint& hinge = builder.add_joint(JointKind::kHinge, 0, SceneBuilder::kWorld, Vec3::Zero(), Vec3::UnitY());
+  hinge.limits = JointLimits{0, kPi};  // of the world against the flap
+  World world(builder);
+  double lowest = 1;
+  for (int i = 0; i < 240; ++i) {
+    world.stepper.step(world.set);
+    lowest = std::min(lowest, world.at(0).x().z());
+    ASSERT_LT(world.at(0).v().norm(), 8) << i;
+  }
+  EXPECT_GT(lowest, -0.05);
+  EXPECT_LT(world.at(0).x().x(), -0.49) << "it did not fall open";
+}
+
+// Torn apart further than its ends look, it lets go.
+TEST(Joint, ATornJointDoesNothing) {
+  SceneBuilder builder = awake("torn");
+  builder.scene.gravity = Vec3::Zero();
+  for (int i = 0; i < 2; ++i) builder.add(Sphere{0.2}, Vec3(0.4 * i, 0, 0));
+  builder.add_joint(JointKind::kBall, 0, 1, Vec3(0.2, 0, 0));
+  World world(builder);
+  world.stepper.step(world.set);
+  ASSERT_EQ(world.set.contacts.size(), 1u);
+  world.set.bodies[1].set_x(Vec3(0.2 + 0.15 + 0.2, 0, 0));
+  world.stepper.step(world.set);
+  EXPECT_EQ(world.set.contacts.size(), 1u) << "it holds within its slack";
+  world.set.bodies[1].set_x(Vec3(0.9, 0, 0));
+  world.set.bodies[1].set_v(Vec3::Zero());
+  world.set.bodies[0].set_v(Vec3::Zero());
+  world.stepper.step(world.set);
+  EXPECT_EQ(world.set.contacts.size(), 0u);
+  EXPECT_EQ(world.at(1).v(), Vec3::Zero());
 }
 
 TEST(Joint, AMotorReachesItsSpeedAsFastAsItsEffortAllows) {
@@ -237,4 +276,4 @@ TEST(Joint, AHangingChainComesToRestSleepsAndIsWokenAsAWhole) {
 }
 
 }  // namespace
-}  // namespace soda::physics::test
+}  // namespace soda::physics::test::joints

@@ -6,7 +6,7 @@
 #include "common/scene/scene_builder.h"
 #include "physics_scenes.h"
 
-namespace soda::physics::test {
+namespace soda::physics::test::kinematic {
 namespace {
 
 TEST(Kinematic, FollowsItsFunctionOfTimeAndCarriesWhatLiesOnIt) {
@@ -78,4 +78,4 @@ TEST(CollisionGroups, AdmitPairsWhereBothAgree) {
 }
 
 }  // namespace
-}  // namespace soda::physics::test
+}  // namespace soda::physics::test::kinematic
