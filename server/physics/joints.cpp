@@ -190,6 +190,14 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
     }
 }
 
+void JointSolver::push(const Row& row, double impulse, MovingBody& a, MovingBody* b) {
+  a.v -= (a.inverse_mass * impulse) * row.linear;
+  a.w -= impulse * row.a_spin;
+  if (!b) return;
+  b->v += (b->inverse_mass * impulse) * row.linear;
+  b->w += impulse * row.b_spin;
+}
+
 void JointSolver::begin(std::span<MovingBody> bodies, double h) {
   if (used_ == 0) return;
   h_ = h;
@@ -198,13 +206,7 @@ void JointSolver::begin(std::span<MovingBody> bodies, double h) {
     prepare(work, bodies);
     MovingBody& a = bodies[work.a];
     MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
-    const auto push = [&](const Row& row, double impulse) {
-      a.v -= (a.inverse_mass * impulse) * row.linear;
-      a.w -= impulse * row.a_spin;
-      if (!b) return;
-      b->v += (b->inverse_mass * impulse) * row.linear;
-      b->w += impulse * row.b_spin;
-    };
+    const auto push = [&](const Row& row, double impulse) { JointSolver::push(row, impulse, a, b); };
     // What was carried, along the rows as they are now.
     Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
     for (int i = 0; i < work.held; ++i) {
@@ -236,13 +238,7 @@ void JointSolver::solve(Work& work, std::span<MovingBody> bodies, bool bias) con
   const Joint& joint = *work.model->joint;
   MovingBody& a = bodies[work.a];
   MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
-  const auto push = [&](const Row& row, double impulse) {
-    a.v -= (a.inverse_mass * impulse) * row.linear;
-    a.w -= impulse * row.a_spin;
-    if (!b) return;
-    b->v += (b->inverse_mass * impulse) * row.linear;
-    b->w += impulse * row.b_spin;
-  };
+  const auto push = [&](const Row& row, double impulse) { JointSolver::push(row, impulse, a, b); };
   const auto speed_along = [&](const Row& row) { return speed(row.linear, row.a_turn, row.b_turn, a, b); };
   const auto add = [&](Extra which, const Softness& soft, double wanted, double least, double most) {
     const Row& row = work.along[which];

@@ -45,6 +45,7 @@ class JointSolver {
     Row along[kExtras];
     double extra_mass[kExtras], extra_error[kExtras];
   };
+  static void push(const Row& row, double impulse, MovingBody& a, MovingBody* b);
   void prepare(Work& work, std::span<const MovingBody> bodies) const;
   void solve(Work& work, std::span<MovingBody> bodies, bool bias) const;
 
