@@ -8,7 +8,7 @@
 #include "scene.pb.h"
 #include "tests/unit/scene_support.h"
 
-namespace soda {
+namespace soda::scene_joints {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -355,4 +355,4 @@ TEST(SceneBadJointMore, ValidateChecksScenesMadeInMemory) {
 }
 
 }  // namespace
-}  // namespace soda
+}  // namespace soda::scene_joints

@@ -7,7 +7,7 @@
 #include "common/scene/scene_file.h"
 #include "tests/unit/scene_support.h"
 
-namespace soda {
+namespace soda::sdf_joints {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -240,4 +240,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
-}  // namespace soda
+}  // namespace soda::sdf_joints
