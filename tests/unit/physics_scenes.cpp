@@ -66,7 +66,7 @@ Scene dominoes_case() { return generate("dominoes", 60, 4); }
 Scene cluster_case() { return generate("cluster", 120, 5); }
 Scene machines_case() { return generate("machines", 108, 1); }
 Scene shapes_case() { return with_meteor(shapes_scene(), 150); }
-Scene wide_case() { return with_meteor(wide_scene(), 210); }
+Scene wide_case() { return with_meteor(wide_scene(), 330); }
 
 }  // namespace
 
@@ -140,7 +140,7 @@ Scene wide_scene() {
     for (int y = -1; y <= 1; ++y) builder.add(crate, Vec3(2.5 * x, y, 0.16));
   builder.add(Box{Vec3(11, 3, 0.2)}, Vec3(0, 0, 0.45));                                 // a slab on fifteen crates
   builder.add(Box{Vec3(8, 0.3, 0.1)}, Vec3(0, 1, 1.2), rotation_of(Vec3(0, 0.05, 0)));  // a plank that falls on it
-  builder.add(Sphere{1.5}, Vec3(3, -0.5, 4)).angular_damping = 3;  // or it rolls about for ever
+  builder.add(Sphere{1.5}, Vec3(3, -0.5, 4), Quat::Identity(), 50).angular_damping = 3;  // or it rolls for ever
   for (int i = 0; i < 40; ++i)
     builder.add(crate, random.between(Vec3(-5, -1.3, 1.6), Vec3(1, 1.3, 1.7)) + Vec3(0, 0, 0.5 * (i % 8)),
                 random.orientation());
@@ -167,7 +167,7 @@ const std::vector<Case>& cases() {
       {"city", city_case, 240, false, false},       {"towers", towers_case, 240, true, true},
       {"dominoes", dominoes_case, 420, true, true}, {"cluster", cluster_case, 240, false, false},
       {"machines", machines_case, 300, true, true}, {"shapes", shapes_case, 420, true, true},
-      {"wide", wide_case, 460, true, true},
+      {"wide", wide_case, 530, true, true},
   };
   return all;
 }
