@@ -14,13 +14,11 @@ constexpr double kG = 9.81;  // m/s^2
 class Gaps {
  public:
   explicit Gaps(const Scene& scene) {
-    std::vector<BodyId> ids;
-    for (const Body* body : dynamic_bodies(scene)) ids.push_back(body->id);
+    const std::vector<const Body*> bodies = dynamic_bodies(scene);
     const auto end = [&](BodyId id, const Pose& frame) -> End {
-      const auto at = std::find(ids.begin(), ids.end(), id);
-      if (at == ids.end()) return {kNobody, frame.position};
-      const auto body = static_cast<std::size_t>(at - ids.begin());
-      return {body, frame.position - dynamic_bodies(scene)[body]->inertial.centre};
+      for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (bodies[i]->id == id) return {i, frame.position - bodies[i]->inertial.centre};
+      return {kNobody, frame.position};
     };
     for (const Joint& joint : scene.joints)
       pairs_.push_back({end(joint.a, joint.frame_a), end(joint.b, joint.frame_b)});

@@ -82,13 +82,14 @@ void check(const ContactRecord& record, const physics::Model& model) {
     throw CodecError("contact of " + name(record.a) + ": partner not in the scene");
   if (!record.with_static() && record.b <= record.a)
     throw CodecError("contact of " + name(record.a) + ": does not belong to the lower id");
-  if (is_joint(record) ? !model.find_joint(record) : record.b == (kStaticBit | kWorldBody))
-    throw CodecError("joint of " + name(record.a) + ": not in the scene");
   if (is_joint(record)) {
+    if (!model.find_joint(record)) throw CodecError("joint of " + name(record.a) + ": not in the scene");
     if (record.count != 1) throw CodecError("joint of " + name(record.a) + ": not one point");
   } else {
     const physics::BodyModel& a = *model.find(record.a);
     const physics::BodyModel* const b = record.with_static() ? nullptr : model.find(record.b);
+    if (record.b == (kStaticBit | kWorldBody))
+      throw CodecError("contact of " + name(record.a) + ": the world is not to be touched");
     if (record.part >> 20 >= a.children || (b && (record.part >> 8 & 0xfff) >= b->children))
       throw CodecError("contact of " + name(record.a) + ": part is of no shape");
     if (a.kinematic && (!b || b->kinematic))
