@@ -4,15 +4,11 @@
 #include <cmath>
 
 #include "server/physics/lanes.h"
+#include "server/physics/line.h"
 #include "server/physics/tuning.h"
 
 namespace soda::physics {
 namespace {
-
-// One direction at one place of two bodies, b moved by a positive impulse along it.
-struct Line {
-  Vec3 direction, a_turn, b_turn, a_spin, b_spin;
-};
 
 class Pair {
  public:
@@ -46,22 +42,11 @@ class Pair {
     return point.separation[lane] + normal.dot(moved_) - get(point.row.a_turn, lane).dot(a_.turned) +
            (b_ ? get(point.row.b_turn, lane).dot(b_->turned) : 0.0);
   }
-  double speed(const Line& line) const {  // m/s, apart
-    const double of_a = line.direction.dot(a_.v) + line.a_turn.dot(a_.w);
-    return (b_ ? line.direction.dot(b_->v) + line.b_turn.dot(b_->w) : 0.0) - of_a;
-  }
-  // Change of the speed along `at` by a unit impulse along `by`.
+  double speed(const Line& line) const { return speed_along(line, a_, b_); }  // m/s, apart
   double response(const Line& at, const Line& by) const {
-    const double linear = a_.inverse_mass + (b_ ? b_->inverse_mass : 0.0);
-    return linear * at.direction.dot(by.direction) + at.a_turn.dot(by.a_spin) + at.b_turn.dot(by.b_spin);
+    return physics::response(at, by, a_.inverse_mass + (b_ ? b_->inverse_mass : 0.0));
   }
-  void push(const Line& line, double impulse) {
-    a_.v -= (a_.inverse_mass * impulse) * line.direction;
-    a_.w -= impulse * line.a_spin;
-    if (!b_) return;
-    b_->v += (b_->inverse_mass * impulse) * line.direction;
-    b_->w += impulse * line.b_spin;
-  }
+  void push(const Line& line, double impulse) { push_along(line, impulse, a_, b_); }
 
  private:
   MovingBody& a_;

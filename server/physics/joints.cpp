@@ -53,11 +53,6 @@ double unwound(double angle, const std::optional<JointLimits>& limits) {
   return angle;
 }
 
-double speed(const Vec3& linear, const Vec3& a_turn, const Vec3& b_turn, const MovingBody& a, const MovingBody* b) {
-  const double of_a = linear.dot(a.v) + a_turn.dot(a.w);
-  return b ? linear.dot(b->v) + b_turn.dot(b->w) - of_a : -of_a;
-}
-
 }  // namespace
 
 void JointSolver::add(const JointModel& model, std::uint32_t a, std::uint32_t b, std::uint32_t index,
@@ -95,32 +90,29 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
   // Both bodies are pushed in one place, half way between (of a static one it does not matter): turning momentum is
   // kept.
   const auto linear_row = [&](const Vec3& direction) {
-    Row row{direction, (a.arm + half).cross(direction), (b.arm - half).cross(direction), {}, {}};
+    Line row{direction, (a.arm + half).cross(direction), (b.arm - half).cross(direction), {}, {}};
     row.a_spin = a.inverse_inertia * row.a_turn;
     row.b_spin = b.inverse_inertia * row.b_turn;
     return row;
   };
   const auto angular_row = [&](const Vec3& axis) {
-    return Row{Vec3::Zero(), axis, axis, a.inverse_inertia * axis, b.inverse_inertia * axis};
-  };
-  const auto response = [&](const Row& l, const Row& r) {
-    return linear_mass * l.linear.dot(r.linear) + l.a_turn.dot(r.a_spin) + l.b_turn.dot(r.b_spin);
+    return Line{Vec3::Zero(), axis, axis, a.inverse_inertia * axis, b.inverse_inertia * axis};
   };
   const Mat3 axes_a = a.frame.toRotationMatrix();
   work.held = 0;
-  const auto hold = [&](const Row& row, double error) {
+  const auto hold = [&](const Line& row, double error) {
     work.row[work.held] = row;
     work.error[work.held++] = error;
   };
   std::fill_n(work.used, static_cast<int>(kExtras), false);
-  const auto extra = [&](Extra which, const Row& row, double error) {
+  const auto extra = [&](Extra which, const Line& row, double error) {
     work.used[which] = true;
     work.along[which] = row;
-    work.extra_mass[which] = 1 / response(row, row);
+    work.extra_mass[which] = 1 / response(row, row, linear_mass);
     work.extra_error[which] = error;
   };
   // Limits, motor and spring along one freedom at `position`.
-  const auto free_along = [&](const Row& row, double position) {
+  const auto free_along = [&](const Line& row, double position) {
     if (joint.limits) {
       extra(kLower, row, position - joint.limits->lower);
       extra(kUpper, row, position - joint.limits->upper);
@@ -152,7 +144,7 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
       }
       if (joint.limits) {
         const double twist = unwound(2 * angle_of(turn.z(), turn.w()), joint.limits);
-        const Row row = angular_row(z_b);
+        const Line row = angular_row(z_b);
         extra(kLower, row, twist - joint.limits->lower);
         extra(kUpper, row, twist - joint.limits->upper);
       }
@@ -173,7 +165,7 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
     }
     case JointKind::kDistance: {
       const double length = apart.norm();
-      const Row row = linear_row(length > 1e-9 ? Vec3(apart / length) : Vec3(Vec3::UnitZ()));
+      const Line row = linear_row(length > 1e-9 ? Vec3(apart / length) : Vec3(Vec3::UnitZ()));
       if (joint.limits && joint.limits->lower == joint.limits->upper)
         hold(row, length - joint.limits->lower);
       else
@@ -184,18 +176,10 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
 
   for (int i = 0; i < work.held; ++i)
     for (int j = 0; j <= i; ++j) {
-      double sum = response(work.row[i], work.row[j]);
+      double sum = response(work.row[i], work.row[j], linear_mass);
       for (int k = 0; k < j; ++k) sum -= work.factor[i][k] * work.factor[j][k];
       work.factor[i][j] = i == j ? std::sqrt(std::max(sum, 1e-300)) : sum / work.factor[j][j];
     }
-}
-
-void JointSolver::push(const Row& row, double impulse, MovingBody& a, MovingBody* b) {
-  a.v -= (a.inverse_mass * impulse) * row.linear;
-  a.w -= impulse * row.a_spin;
-  if (!b) return;
-  b->v += (b->inverse_mass * impulse) * row.linear;
-  b->w += impulse * row.b_spin;
 }
 
 void JointSolver::begin(std::span<MovingBody> bodies, double h) {
@@ -206,11 +190,11 @@ void JointSolver::begin(std::span<MovingBody> bodies, double h) {
     prepare(work, bodies);
     MovingBody& a = bodies[work.a];
     MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
-    const auto push = [&](const Row& row, double impulse) { JointSolver::push(row, impulse, a, b); };
+    const auto push = [&](const Line& row, double impulse) { push_along(row, impulse, a, b); };
     // What was carried, along the rows as they are now.
     Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
     for (int i = 0; i < work.held; ++i) {
-      const Row& row = work.row[i];
+      const Line& row = work.row[i];
       const bool pushes = !row.linear.isZero(0);
       const double impulse = pushes ? row.linear.dot(work.linear) : row.a_turn.dot(work.angular);
       push(row, impulse);
@@ -238,13 +222,12 @@ void JointSolver::solve(Work& work, std::span<MovingBody> bodies, bool bias) con
   const Joint& joint = *work.model->joint;
   MovingBody& a = bodies[work.a];
   MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
-  const auto push = [&](const Row& row, double impulse) { JointSolver::push(row, impulse, a, b); };
-  const auto speed_along = [&](const Row& row) { return speed(row.linear, row.a_turn, row.b_turn, a, b); };
+  const auto push = [&](const Line& row, double impulse) { push_along(row, impulse, a, b); };
   const auto add = [&](Extra which, const Softness& soft, double wanted, double least, double most) {
-    const Row& row = work.along[which];
+    const Line& row = work.along[which];
     double& sum = work.extra[static_cast<std::size_t>(which)];
     const double change =
-        -soft.mass_scale * work.extra_mass[which] * (speed_along(row) + wanted) - soft.impulse_scale * sum;
+        -soft.mass_scale * work.extra_mass[which] * (speed_along(row, a, b) + wanted) - soft.impulse_scale * sum;
     const double now = std::clamp(sum + change, least, most);
     push(row, now - sum);
     sum = now;
@@ -280,7 +263,7 @@ void JointSolver::solve(Work& work, std::span<MovingBody> bodies, bool bias) con
                                      : kRigid;
   double x[kHeld];
   for (int i = 0; i < work.held; ++i) {  // forward ...
-    double sum = speed_along(work.row[i]) + soft.bias_rate * work.error[i];
+    double sum = speed_along(work.row[i], a, b) + soft.bias_rate * work.error[i];
     for (int k = 0; k < i; ++k) sum -= work.factor[i][k] * x[k];
     x[i] = sum / work.factor[i][i];
   }
@@ -291,7 +274,7 @@ void JointSolver::solve(Work& work, std::span<MovingBody> bodies, bool bias) con
   }
   Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
   for (int i = 0; i < work.held; ++i) {
-    const Row& row = work.row[i];
+    const Line& row = work.row[i];
     const bool pushes = !row.linear.isZero(0);
     const double before = pushes ? row.linear.dot(work.linear) : row.a_turn.dot(work.angular);
     const double impulse = -soft.mass_scale * x[i] - soft.impulse_scale * before;

@@ -10,6 +10,7 @@
 
 #include "common/contact_record.h"
 #include "server/physics/integrator.h"
+#include "server/physics/line.h"
 #include "server/physics/softness.h"
 
 namespace soda::physics {
@@ -26,10 +27,6 @@ class JointSolver {
   void store(std::span<ContactRecord> records) const;
 
  private:
-  // One direction in which the two bodies move against each other: linear . (vb - va) + b_turn . wb - a_turn . wa.
-  struct Row {
-    Vec3 linear, a_turn, b_turn, a_spin, b_spin;
-  };
   static constexpr int kHeld = 6;
   enum Extra { kLower, kUpper, kMotor, kSpring, kCone, kExtras };
   struct Work {
@@ -38,14 +35,13 @@ class JointSolver {
     Vec3 linear, angular;               // N s, N m s on b, world axes, of this sub-step
     std::array<double, kExtras> extra;  // likewise, along the extra rows
     int held;
-    Row row[kHeld];
+    Line row[kHeld];
     double error[kHeld];
     double factor[kHeld][kHeld];  // Cholesky's, of the effective inverse mass
     bool used[kExtras];
-    Row along[kExtras];
+    Line along[kExtras];
     double extra_mass[kExtras], extra_error[kExtras];
   };
-  static void push(const Row& row, double impulse, MovingBody& a, MovingBody* b);
   void prepare(Work& work, std::span<const MovingBody> bodies) const;
   void solve(Work& work, std::span<MovingBody> bodies, bool bias) const;
 
