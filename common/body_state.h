@@ -13,6 +13,9 @@ enum BodyFlags : std::uint32_t {
   kAsleep = 1u << 0,
   // Bit 1 + axis: the drive's target velocity is turned round along that axis (see Drive in scene.h).
   kDriveReversed = 1u << 1,
+  // Bits 4 to 6: the stiffness of contacts that its island was last solved with (physics/choices.h), 0 where none was
+  // chosen.
+  kStiffness = 1u << 4,
 };
 
 struct BodyState {
@@ -24,6 +27,8 @@ struct BodyState {
   std::uint32_t quiet_steps = 0;           // steps in a row below the sleep thresholds
   std::uint32_t flags = 0;                 // BodyFlags
 
+  std::uint32_t stiffness() const { return flags / kStiffness & 7u; }
+  void set_stiffness(std::uint32_t level) { flags = (flags & ~(7u * kStiffness)) | level * kStiffness; }
   bool asleep() const { return (flags & kAsleep) != 0; }
   Vec3 x() const { return Vec3(position[0], position[1], position[2]); }
   Quat q() const { return Quat(orientation[3], orientation[0], orientation[1], orientation[2]); }

@@ -16,7 +16,7 @@ constexpr int kMaxContactPoints = 4;  // per record
 struct ContactPoint {
   double arm_a[3];  // m, from a's centre of mass to its surface, when detected
   double arm_b[3];  // m, from b's centre of mass (static: origin) to its surface, when detected
-  double impulse;   // N s, along the normal, of the last sub-step solved
+  double impulse;   // N s, along the normal, at the rate of the last sub-step solved: what it gives in a whole step
 };
 
 struct ContactRecord {
@@ -28,15 +28,15 @@ struct ContactRecord {
   double offset[3] = {0, 0, 0};            // m, from a's centre of mass to b's, when the points were detected
   double orientation_a[4] = {0, 0, 0, 1};  // of a, when detected: x, y, z, w
   double orientation_b[4] = {0, 0, 0, 1};
-  double friction[3] = {0, 0, 0};               // N s, friction impulse on b
+  double friction[3] = {0, 0, 0};               // N s, friction impulse on b, likewise
   double twist = 0;                             // N m s, friction about the normal
   ContactPoint points[kMaxContactPoints] = {};  // the first `count` are in use, the others all zero
 
   bool with_static() const { return (b & kStaticBit) != 0; }
 };
 
-// ---- records of joints: `part` is this and the joint's number among those of the two bodies. One point holds impulses
-// of the last sub-step, arm_a the linear one on b, N s, arm_b the angular one, N m s, both in world axes; `impulse`,
+// ---- records of joints: `part` is this and the joint's number among those of the two bodies. One point holds impulses,
+// at the rate of the last sub-step: arm_a the linear one on b, N s, arm_b the angular one, N m s, both in world axes; `impulse`,
 // `friction` and `twist` those of limits, motor and spring. Without normal and anchors.
 constexpr std::uint32_t kJointPart = 0xffffff00u;
 inline bool is_joint(const ContactRecord& record) { return record.part >= kJointPart; }

@@ -1,6 +1,7 @@
 #include "common/math.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace soda {
 namespace {
@@ -49,7 +50,7 @@ void sin_cos(double angle, double& sine, double& cosine) {
 }
 
 double angle_of(double sine, double cosine) {
-  constexpr double kPi = 3.14159265358979323846, kTanOfPiOver8 = 0.41421356237309503;
+  constexpr double kPi = std::numbers::pi, kTanOfPiOver8 = 0.41421356237309503;
   const double x = std::abs(cosine), y = std::abs(sine);
   const double larger = x > y ? x : y, smaller = x > y ? y : x;
   if (!(larger > 0)) return 0;

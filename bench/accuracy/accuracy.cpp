@@ -33,7 +33,7 @@ std::vector<Setting> settings_of(const Case& c, bool quick) {
     if (quick && dt != 1.0 / 60) continue;
     if (dt >= c.smallest_dt_bullet) settings.push_back({true, dt, 0});
     for (const std::uint32_t n : c.substeps)
-      if (n / dt <= c.most_substeps * 1.001 && (!quick || n == 4 || n == 16 || c.substeps.size() == 1))
+      if (n / dt <= c.most_substeps * 1.001 && (!quick || n == 0 || n == 4 || n == 16 || c.substeps.size() == 1))
         settings.push_back({false, dt, n});
   }
   return settings;

@@ -90,7 +90,8 @@ std::string text_of(const Verdict::Side& side, std::size_t measure) {
 
 std::string text_of(const Setting& setting) {
   const std::string rate = "1/" + std::to_string(std::lround(1 / setting.dt));
-  return setting.bullet ? rate : rate + " x " + std::to_string(setting.substeps);
+  if (setting.bullet) return rate;
+  return setting.substeps == 0 ? rate + " chosen" : rate + " x " + std::to_string(setting.substeps);
 }
 
 std::vector<Verdict> verdicts(const Case& c, const std::vector<Result>& results) {
@@ -188,7 +189,10 @@ void draw(const Options& options, const Case& c, const std::vector<Result>& resu
   const Measure& main = c.measures[c.main_measure()];
   std::vector<Curve> curves = {{"stock Bullet", "#909090", {}}};
   for (std::size_t i = 0; i < c.substeps.size(); ++i)
-    curves.push_back({"SODA, " + std::to_string(c.substeps[i]) + " sub-steps", kColours[i % std::size(kColours)], {}});
+    curves.push_back({c.substeps[i] == 0 ? "SODA, sub-steps chosen by island"
+                                         : "SODA, " + std::to_string(c.substeps[i]) + " sub-steps",
+                      kColours[i % std::size(kColours)],
+                      {}});
   double least = main.limit;  // a logarithmic axis knows no 0: those lie at its foot
   for (const Result& r : results) {
     const auto n = std::find(c.substeps.begin(), c.substeps.end(), r.setting.substeps) - c.substeps.begin();

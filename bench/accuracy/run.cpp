@@ -105,7 +105,7 @@ double Outcome::score(const Case& c) const {
 Outcome run(const Variant& variant, const Setting& setting) {
   Scene scene = variant.scene(setting.dt);
   scene.dt = setting.dt;
-  scene.substeps = std::max(setting.substeps, 1u);
+  scene.substeps = setting.substeps;
   scene.sleeping = false;
   return setting.bullet ? run_side<BulletSide>(variant, scene) : run_side<SodaSide>(variant, scene);
 }

@@ -95,6 +95,7 @@ std::vector<std::string> arguments(const LaunchOptions& o, double dt, WorldId wo
     add(dds::arguments(o.network));
   }
   if (o.follow.verbose) add({"--verbose"});
+  if (o.follow.explain) add({"--explain"});
   if (world != 0) return args;
   add({"--scene-fd", std::to_string(kSceneFd), "--worlds", std::to_string(o.worlds), "--steps", std::to_string(o.steps),
        "--pace", o.pace, "--sync", o.sync, "--anticipation", std::to_string(o.window), "--input-lead",

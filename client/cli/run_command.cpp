@@ -115,6 +115,8 @@ void add_run_command(CLI::App& app, int& exit_code) {
   command->add_option("--dump", o->follow.files.dump, "write whole states to this file, for `soda diff`");
   command->add_option("--dump-steps", o->dump_steps, "A[:B]: the steps to dump; the last one if not given");
   command->add_option("--start", o->start, "start only these worlds (as in 0,2-3); the others are started by hand");
+  command->add_flag("--explain", o->follow.explain,
+                    "tell at the end how the scene was modelled, how often, and what that cost");
   command->add_flag("--quiet,-q", o->follow.quiet, "no progress");
   command->add_flag("--verbose,-v", o->follow.verbose, "show all that the daemons say");
   dds::add_network_options(*command, o->network);

@@ -55,7 +55,7 @@ std::string list_shapes(const std::array<std::size_t, std::variant_size_v<Geomet
 }
 
 std::string list_joints(const Scene& scene) {
-  std::array<std::size_t, 5> counts{};
+  std::array<std::size_t, 6> counts{};
   for (const Joint& joint : scene.joints) ++counts[static_cast<std::size_t>(joint.kind)];
   std::string text;
   for (std::size_t k = 0; k < counts.size(); ++k)
@@ -125,7 +125,9 @@ void print_summary(const Scene& scene, const std::string& file) {
   std::printf("    shapes        %s\n", list_shapes(fixed).c_str());
   std::printf("  joints          %s\n", list_joints(scene).c_str());
   std::printf("  gravity         %.6g %.6g %.6g m/s^2\n", scene.gravity.x(), scene.gravity.y(), scene.gravity.z());
-  std::printf("  step            %.9g s, %u sub-steps, sleeping %s, at most %.6g m/s\n", scene.dt, scene.substeps,
+  const std::string substeps =
+      scene.substeps == 0 ? "as many sub-steps as each island needs" : counted(scene.substeps, "sub-step", "sub-steps");
+  std::printf("  step            %.9g s, %s, sleeping %s, at most %.6g m/s\n", scene.dt, substeps.c_str(),
               scene.sleeping ? "on" : "off", scene.max_speed);
   const Grid grid = make_grid(scene);
   std::printf("  territory grid  %d x %d x %d cells of %.6g m (%s)\n", grid.size[0], grid.size[1], grid.size[2],

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <utility>
 
+#include "client/cli/explanation.h"
 #include "client/cli/stats_file.h"
 
 namespace soda::cli {
@@ -116,6 +117,7 @@ int follow(ReportSource& source, Processes& processes, Table& table, StopSignals
     code = kExitFailed;
   }
   print_summary(collector, complete);
+  if (options.explain) print_explanation(collector);
   return code;
 }
 

@@ -20,6 +20,7 @@ struct FollowOptions {
   std::filesystem::path stats;  // file to write; empty: none
   bool quiet = false;
   bool verbose = false;
+  bool explain = false;  // tell how the scene was modelled, and what that cost
 };
 
 // Returns the command's exit code: 0, 1 if a daemon or the report failed, 2 if a daemon refused its scene or options,

@@ -22,9 +22,8 @@ std::string ActionLog::body_problem(BodyId id, Step step) const {
         return name + " is removed at step " + std::to_string(turn.step + 1);
     }
   if (spawned) return "";
-  const auto at = std::lower_bound(scene_.bodies.begin(), scene_.bodies.end(), id,
-                                   [](const Body& b, BodyId wanted) { return b.id < wanted; });
-  if (at == scene_.bodies.end() || at->id != id) return "there is no " + name;
+  const Body* const at = find_body(scene_, id);
+  if (!at) return "there is no " + name;
   if (at->motion) return name + " follows a motion of its own";
   return at->is_static ? name + " is static" : "";
 }

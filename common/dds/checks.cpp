@@ -180,6 +180,8 @@ std::string problem(const wire::Status& s) {
   if (!ok_step(s.repair_step())) return "impossible step";
   for (double seconds : {s.work_seconds(), s.waiting_seconds(), s.paced_seconds(), s.cpu_seconds(), s.repair_seconds()})
     if (!ok_seconds(seconds)) return "impossible time";
+  for (const wire::ModelShare& share : s.shares())
+    if (!ok_seconds(share.seconds())) return "impossible time";
   return "";
 }
 

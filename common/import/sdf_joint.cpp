@@ -1,6 +1,7 @@
 // Joints of SDF models.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <sdf/JointAxis.hh>
 #include <sdf/sdf.hh>
 
@@ -12,6 +13,7 @@ namespace soda {
 namespace {
 
 constexpr double kNoLimit = 1e16;  // from there on SDF means none
+constexpr double kAcross = 1e-3;   // cosine of two axes at right angles, at most
 
 JointKind kind_of(const sdf::Joint& joint, std::string& reason) {
   switch (joint.Type()) {
@@ -20,13 +22,15 @@ JointKind kind_of(const sdf::Joint& joint, std::string& reason) {
       return JointKind::kHinge;
     case sdf::JointType::PRISMATIC:
       return JointKind::kSlider;
+    case sdf::JointType::UNIVERSAL:
+      return JointKind::kUniversal;
     case sdf::JointType::BALL:
       return JointKind::kBall;
     case sdf::JointType::FIXED:
       return JointKind::kFixed;
     default:
       reason = "\"" + (joint.Element() ? joint.Element()->Get<std::string>("type") : "this") +
-               "\" is not simulated; revolute, continuous, prismatic, ball and fixed are";
+               "\" is not simulated; revolute, continuous, prismatic, ball, fixed and universal are";
       return JointKind::kFixed;
   }
 }
@@ -76,15 +80,26 @@ void SdfModelConverter::add_joint(const sdf::Joint& from, const std::string& sco
   // In the model, as the poses of the bodies.
   Pose frame = compose(pose_of_end(joint.b), pose_of(in_child));
   const bool has_axis = joint.kind == JointKind::kHinge || joint.kind == JointKind::kSlider;
-  const sdf::JointAxis* const axis = has_axis ? from.Axis(0) : nullptr;
-  if (has_axis) {
-    if (!axis) fail(place, "axis", "must be given");
+  const auto direction_of = [&](unsigned index) {
+    const std::string field = index == 0 ? "axis" : "axis2";
+    const sdf::JointAxis* const axis = from.Axis(index);
+    if (!axis) fail(place, field, "must be given");
     ignition::math::Vector3d xyz;
-    check(axis->ResolveXyz(xyz), "axis.xyz");
+    check(axis->ResolveXyz(xyz), (field + ".xyz").c_str());
     const Vec3 direction = vec3_of(xyz);
     if (!(direction.squaredNorm() > 1e-12 && direction.squaredNorm() < 1e12))
-      fail(place, "axis.xyz", "must be a direction");
-    frame = compose(frame, joint_frame(joint.kind, Vec3::Zero(), direction));
+      fail(place, field + ".xyz", "must be a direction");
+    return direction;
+  };
+  const sdf::JointAxis* const axis = from.Axis(0);
+  if (has_axis) frame = compose(frame, joint_frame(joint.kind, Vec3::Zero(), direction_of(0)));
+  if (joint.kind == JointKind::kUniversal) {
+    const Vec3 first = direction_of(0).normalized(), second = direction_of(1).normalized();
+    if (std::abs(first.dot(second)) > kAcross) fail(place, "axis2.xyz", "must be across axis.xyz");
+    frame = compose(frame, universal_frame(Vec3::Zero(), first, second));
+    for (const unsigned index : {0u, 1u})
+      if (from.Axis(index)->Lower() > -kNoLimit || from.Axis(index)->Upper() < kNoLimit)
+        warnings_.add("the limits of a universal <joint> are left out", top_ + "::" + joint.name, uses_);
   }
   joint.frame_a = frame_in(pose_of_end(joint.a), frame);
   joint.frame_b = frame_in(pose_of_end(joint.b), frame);
@@ -103,7 +118,7 @@ void SdfModelConverter::read_hinge_limits(const sdf::JointAxis& axis, const std:
   JointLimits limits{axis.Lower(), axis.Upper()};
   if (limits.lower <= -kNoLimit && limits.upper >= kNoLimit) return;
   if (limits.lower > limits.upper) fail(place, "axis.limit.upper", "must not be below lower");
-  if (limits.upper - limits.lower >= 2 * kMaxAngle) {
+  if (limits.upper - limits.lower >= 2 * std::numbers::pi) {
     warnings_.add("the limits of a revolute <joint> that span a turn or more, or are only one, are left out",
                   top_ + "::" + joint.name, uses_);
     return;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <sdf/sdf.hh>
 
 #include "common/import/sdf_document.h"
@@ -25,7 +26,7 @@ sdf::ElementPtr child(const sdf::ElementPtr& element, const char* name) {
 // An ellipsoid by 178 points of its surface.
 ConvexHull ellipsoid(const Vec3& radii) {
   constexpr int kRings = 12, kSegments = 16;
-  constexpr double kPi = 3.14159265358979323846;
+  constexpr double kPi = std::numbers::pi;
   ConvexHull hull;
   for (int ring = 0; ring <= kRings; ++ring) {
     double sin_ring = 0, cos_ring = 0;

@@ -3,6 +3,7 @@
 #include <tinyxml2.h>
 
 #include <cmath>
+#include <numbers>
 #include <cstdlib>
 #include <ignition/math/Pose3.hh>
 
@@ -118,7 +119,7 @@ std::optional<Pose> read_plain_pose(const tinyxml2::XMLElement& element) {
     if (!(q.squaredNorm() > 1e-12 && q.squaredNorm() < 1e12)) return {};
     pose.orientation = normalized(q);
   } else {
-    const double unit = degrees ? 3.14159265358979323846 / 180 : 1;
+    const double unit = degrees ? std::numbers::pi / 180 : 1;
     const ignition::math::Quaterniond q(v[3] * unit, v[4] * unit, v[5] * unit);  // libsdformat's own convention
     pose.orientation = Quat(q.W(), q.X(), q.Y(), q.Z());
   }

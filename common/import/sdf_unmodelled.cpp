@@ -15,7 +15,7 @@ const std::map<std::string, std::vector<std::string>>& understood() {
       {"world", {"gravity", "physics", "frame", "model", "include", "population"}},
       {"physics", {"max_step_size"}},
       {"model", {"pose", "static", "frame", "link", "model", "include", "joint"}},
-      {"joint", {"pose", "parent", "child", "axis"}},
+      {"joint", {"pose", "parent", "child", "axis", "axis2"}},
       {"axis", {"xyz", "limit", "dynamics"}},
       {"limit", {"lower", "upper"}},
       {"dynamics", {}},

@@ -1,5 +1,6 @@
 // Machines: what joints and prescribed motions are for.
 #include <algorithm>
+#include <numbers>
 #include <vector>
 
 #include "common/scene/generator_parts.h"
@@ -7,7 +8,7 @@
 namespace soda::generator {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kPi = std::numbers::pi;
 
 // One machine of a fixed number of bodies, of which only the first `count` are wanted; joints go with their bodies.
 class Machine {

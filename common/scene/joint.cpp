@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 #include <tuple>
 #include <utility>
 
@@ -15,19 +16,13 @@ namespace {
 constexpr double kSlackShare = 0.5;   // of the smaller body's bounding radius
 constexpr double kLeastSlack = 0.02;  // m
 
-Body* find(Scene& scene, BodyId id) {
-  const auto it = std::lower_bound(scene.bodies.begin(), scene.bodies.end(), id,
-                                   [](const Body& body, BodyId wanted) { return body.id < wanted; });
-  return it != scene.bodies.end() && it->id == id ? &*it : nullptr;
-}
-
 double radius_of(const Scene& scene, BodyId id) {
-  const Body* const body = find(const_cast<Scene&>(scene), id);
+  const Body* const body = find_body(scene, id);
   return body && !body->is_static ? bounding_radius(scene, *body) : HUGE_VAL;
 }
 
 bool is_dynamic(const Scene& scene, BodyId id) {
-  const Body* const body = find(const_cast<Scene&>(scene), id);
+  const Body* const body = find_body(scene, id);
   return body && !body->is_static;
 }
 
@@ -48,13 +43,23 @@ Quat kept_unit(const Quat& q) { return std::abs(q.squaredNorm() - 1) <= 1e-12 ? 
 }  // namespace
 
 const char* name_of(JointKind kind) {
-  static const char* const names[] = {"fixed", "ball", "hinge", "slider", "distance"};
+  static const char* const names[] = {"fixed", "ball", "hinge", "slider", "distance", "universal"};
   const auto index = static_cast<std::size_t>(kind);
   return index < std::size(names) ? names[index] : "kind";
 }
 
 Pose joint_frame(JointKind kind, const Vec3& at, const Vec3& axis) {
   return {at, turn_to(kind == JointKind::kSlider, axis / std::sqrt(axis.squaredNorm()))};
+}
+
+Pose universal_frame(const Vec3& at, const Vec3& axis_a, const Vec3& axis_b) {
+  const Pose along = joint_frame(JointKind::kSlider, at, axis_a);
+  // A turn about x, by the half angle's sine and cosine: IEEE operations only.
+  const Vec3 side = along.orientation.conjugate() * axis_b;
+  const double length = std::sqrt(side.y() * side.y() + side.z() * side.z());
+  const double y = side.y() / length, z = side.z() / length;
+  const Quat turn = y >= 0 ? Quat(1 + y, z, 0, 0) : Quat(z, 1 - y, 0, 0);
+  return {at, kept_unit(along.orientation * normalized(turn))};
 }
 
 Pose frame_in(const Pose& pose, const Pose& frame) {
@@ -66,6 +71,13 @@ void turn_round(Joint& joint) {
   std::swap(joint.a, joint.b);
   std::swap(joint.frame_a, joint.frame_b);
   if (joint.kind == JointKind::kDistance) return;
+  if (joint.kind == JointKind::kUniversal) {
+    // x and y change their parts: half a turn about the line between them.
+    constexpr double kHalf = std::numbers::sqrt2 / 2;
+    for (Pose* frame : {&joint.frame_a, &joint.frame_b})
+      frame->orientation = kept_unit(frame->orientation * Quat(0, kHalf, kHalf, 0));
+    return;
+  }
   // 0 - x, so that 0 stays 0 and not -0.
   if (joint.limits) joint.limits = JointLimits{0 - joint.limits->upper, 0 - joint.limits->lower};
   if (joint.motor) joint.motor->target_velocity = 0 - joint.motor->target_velocity;
@@ -93,8 +105,8 @@ void finish_joints(Scene& scene) {
                    [](const Joint& l, const Joint& r) { return std::tie(l.a, l.b) < std::tie(r.a, r.b); });
   for (Body& body : scene.bodies) body.joint_reach = 0;
   for (const Joint& joint : scene.joints) {
-    Body* const a = find(scene, joint.a);
-    Body* const b = find(scene, joint.b);
+    Body* const a = find_body(scene, joint.a);
+    Body* const b = find_body(scene, joint.b);
     if (!b || b->is_static) continue;  // what does not move is known to all
     const auto reach = [](Body* body, const Pose& frame, double beyond) {
       if (!body || body->is_static) return;

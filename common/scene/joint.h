@@ -19,6 +19,7 @@ enum class JointKind : std::uint8_t {
   kHinge,     // origins and z axes stay one
   kSlider,    // axes stay parallel, b's origin on a's x axis
   kDistance,  // origins stay within limits of each other
+  kUniversal,  // origins stay one, a's x axis stays across b's y axis
 };
 
 struct JointLimits {
@@ -55,6 +56,8 @@ const char* name_of(JointKind kind);  // as idl/scene.proto spells it
 
 // The frame of a joint of that kind at a place, its axis (z; of a slider x) along `axis`, which must not be zero.
 Pose joint_frame(JointKind kind, const Vec3& at, const Vec3& axis);
+// Of a universal joint: x along `axis_a`, y along `axis_b`, or as near to it as may be; the two must not be parallel.
+Pose universal_frame(const Vec3& at, const Vec3& axis_a, const Vec3& axis_b);
 // The same frame, given in the world, in that of a body at `pose`.
 Pose frame_in(const Pose& pose, const Pose& frame);
 

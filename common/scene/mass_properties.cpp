@@ -2,13 +2,14 @@
 
 #include <Eigen/Eigenvalues>
 #include <stdexcept>
+#include <numbers>
 
 #include "common/scene/convex_hull.h"
 
 namespace soda {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kPi = std::numbers::pi;
 
 Inertial diagonal(double mass, double xx, double yy, double zz) {
   Inertial i;

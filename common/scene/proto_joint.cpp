@@ -56,20 +56,21 @@ void read_kind(const pb::Joint& message, Joint& joint) {
       return read_single(message.slider(), JointKind::kSlider, joint);
     case pb::Joint::kDistance:
       return read_single(message.distance(), JointKind::kDistance, joint);
+    case pb::Joint::kUniversal:
+      joint.kind = JointKind::kUniversal;
+      return refuse_unknown(message.universal(), "universal");
     case pb::Joint::KIND_NOT_SET:
       break;
   }
-  throw FieldError("", "is of no kind that this version of SODA knows (fixed, ball, hinge, slider, distance)");
+  throw FieldError("", "is of no kind that this version of SODA knows (fixed, ball, hinge, slider, distance, universal)");
 }
 
 // None for the world.
 const Body* find_end(const Scene& scene, BodyId id, const char* field) {
   if (id == kWorldBody) return nullptr;
-  const auto it = std::lower_bound(scene.bodies.begin(), scene.bodies.end(), id,
-                                   [](const Body& body, BodyId wanted) { return body.id < wanted; });
-  if (it == scene.bodies.end() || it->id != id)
-    throw FieldError(field, "names no body of this scene: " + std::to_string(id));
-  return &*it;
+  const Body* const body = find_body(scene, id);
+  if (!body) throw FieldError(field, "names no body of this scene: " + std::to_string(id));
+  return body;
 }
 
 Vec3 place_of(const Body* body, const Pose& frame) { return body ? (body->pose * frame).position : frame.position; }
@@ -149,6 +150,9 @@ void write_joint(const Joint& joint, pb::Joint* out) {
       return write_single(joint, out->mutable_slider());
     case JointKind::kDistance:
       return write_single(joint, out->mutable_distance());
+    case JointKind::kUniversal:
+      out->mutable_universal();
+      return;
   }
 }
 

@@ -110,7 +110,7 @@ class SceneReader {
     scene_.name = message_.name();
     if (message_.has_gravity()) scene_.gravity = read_vec3(message_.gravity(), "gravity");
     if (message_.has_dt()) scene_.dt = message_.dt();
-    if (message_.has_substeps()) scene_.substeps = message_.substeps();
+    if (message_.has_model()) read_model(message_.model());
     if (message_.has_sleeping()) scene_.sleeping = message_.sleeping();
     if (message_.has_max_speed()) scene_.max_speed = message_.max_speed();
     scene_.territory_cell = message_.territory_cell();
@@ -120,6 +120,26 @@ class SceneReader {
     if (message_.has_joint_count() && message_.joint_count() != static_cast<std::uint64_t>(message_.joint_size()))
       throw FieldError("joint_count", "says " + std::to_string(message_.joint_count()) + ", but there are " +
                                           std::to_string(message_.joint_size()) + " joints: is the file cut short?");
+  }
+
+  void read_model(const pb::Model& model) {
+    refuse_unknown(model, "model");
+    if (model.has_substeps()) {
+      if (model.substeps() == 0) throw FieldError("model.substeps", "is 0; left out, it is chosen for each island");
+      scene_.substeps = model.substeps();
+    }
+    switch (model.joints()) {
+      case pb::Model::CHOSEN:
+        return;
+      case pb::Model::DIRECT:
+        scene_.joint_method = JointMethod::kDirect;
+        return;
+      case pb::Model::ITERATED:
+        scene_.joint_method = JointMethod::kIterated;
+        return;
+      default:
+        throw FieldError("model.joints", "is " + std::to_string(model.joints()) + ", which means nothing");
+    }
   }
 
   void read_materials() {
@@ -352,7 +372,9 @@ pb::Scene to_proto(const Scene& scene) {
   message.set_name(scene.name);
   write_vec3(scene.gravity, message.mutable_gravity());
   message.set_dt(scene.dt);
-  message.set_substeps(scene.substeps);
+  if (scene.substeps != 0) message.mutable_model()->set_substeps(scene.substeps);
+  if (scene.joint_method == JointMethod::kDirect) message.mutable_model()->set_joints(pb::Model::DIRECT);
+  if (scene.joint_method == JointMethod::kIterated) message.mutable_model()->set_joints(pb::Model::ITERATED);
   message.set_sleeping(scene.sleeping);
   message.set_max_speed(scene.max_speed);
   message.set_territory_cell(scene.territory_cell);

@@ -101,11 +101,19 @@ struct Body {
   std::uint32_t colour = 0xb0b0b0ff;  // RGBA, for display
 };
 
+// How joints that hang together by bodies are solved.
+enum class JointMethod : std::uint8_t {
+  kChosen,    // as a whole unless that would take too long
+  kDirect,    // as a whole, however many
+  kIterated,  // one after the other
+};
+
 struct Scene {
   std::string name;
   Vec3 gravity = Vec3(0, 0, -9.81);  // m/s^2
   double dt = 1.0 / 60;              // s, one step
-  std::uint32_t substeps = 4;        // solver sub-steps per step
+  std::uint32_t substeps = 0;        // solver sub-steps per step; 0: chosen for each island by its state
+  JointMethod joint_method = JointMethod::kChosen;
   bool sleeping = true;              // whether quiet islands may sleep
   double max_speed = 100;            // m/s; faster bodies are clamped, counted and reported
   double territory_cell = 0;         // m, edge of a territory cell; 0: chosen from the bodies (grid.h)
@@ -113,5 +121,9 @@ struct Scene {
   std::vector<Body> bodies;   // ascending by id
   std::vector<Joint> joints;  // ascending by a, then b; no joint names a body that is not there
 };
+
+// The scene's body of that id, or null.
+const Body* find_body(const Scene& scene, BodyId id);
+Body* find_body(Scene& scene, BodyId id);
 
 }  // namespace soda

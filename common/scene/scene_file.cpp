@@ -129,6 +129,8 @@ std::string scene_to_text(const Scene& scene) {
   // Ahead of what it counts, so that no cut takes both away.
   if (message.has_joint_count()) first.set_joint_count(message.joint_count());
   message.clear_joint_count();
+  if (message.has_model()) *first.mutable_model() = message.model();
+  message.clear_model();
   std::string count, text;
   if (!printer.PrintToString(first, &count) || !printer.PrintToString(message, &text))
     refuse(scene.name, "cannot be written as text");

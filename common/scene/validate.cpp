@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <unordered_set>
 
 #include "common/scene/convex_hull.h"
@@ -186,7 +187,7 @@ MaybeProblem motion_problem(const Body& body, double max_speed) {
   if (auto p = in_range("motion.frequency", motion.frequency, 0, kMaxFrequency, " Hz")) return p;
   if (auto p = in_range("motion.phase", motion.phase, -100, 100, " rad")) return p;
   if (auto p = length_in_range("motion.angular_velocity", motion.angular_velocity, kMaxSpin, " rad/s")) return p;
-  const double fastest = motion.velocity.norm() + 2 * kMaxAngle * motion.frequency * motion.amplitude.norm() +
+  const double fastest = motion.velocity.norm() + 2 * std::numbers::pi * motion.frequency * motion.amplitude.norm() +
                          motion.angular_velocity.norm() * body.inertial.centre.norm();
   if (!(fastest <= max_speed))
     return Problem{"motion", "reaches " + number(fastest) + " m/s; the scene's max_speed is " + number(max_speed)};
@@ -197,7 +198,8 @@ MaybeProblem scene_problem(const Scene& scene) {
   if (auto p = name_problem(scene.name)) return p;
   if (auto p = length_in_range("gravity", scene.gravity, kMaxAcceleration, " m/s^2")) return p;
   if (auto p = in_range("dt", scene.dt, kMinStep, kMaxStep, " s")) return p;
-  if (auto p = in_range("substeps", scene.substeps, 1, kMaxSubsteps)) return p;
+  if (auto p = in_range("model.substeps", scene.substeps, 0, kMaxSubsteps)) return p;
+  if (scene.joint_method > JointMethod::kIterated) return Problem{"model.joints", "is of no known kind"};
   if (auto p = in_range("max_speed", scene.max_speed, 0, kMaxSpeedLimit, " m/s")) return p;
   if (scene.max_speed == 0) return Problem{"max_speed", "must be positive, is 0"};
   if (scene.territory_cell != 0)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -48,7 +49,7 @@ constexpr double kMinStep = 1e-6, kMaxStep = 1;          // s, of Scene::dt
 constexpr unsigned kMaxSubsteps = 64;
 constexpr double kMaxFriction = 100;
 constexpr double kMaxDamping = 1e4;                   // 1/s
-constexpr double kMaxAngle = 3.14159265358979323846;  // rad, of limits of hinges and twists
+constexpr double kMaxAngle = std::numbers::pi;  // rad, of limits of hinges and twists
 constexpr double kMaxEffort = 1e18;                   // N, N m
 constexpr double kMaxFrequency = 1e4;                 // Hz, of springs
 constexpr double kMaxDampingRatio = 100;

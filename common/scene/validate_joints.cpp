@@ -44,17 +44,11 @@ MaybeProblem spring_problem(const std::string& field, const JointSpring& spring)
   return in_range(field + ".damping_ratio", spring.damping_ratio, 0, kMaxDampingRatio);
 }
 
-const Body* find(const Scene& scene, BodyId id) {
-  const auto it = std::lower_bound(scene.bodies.begin(), scene.bodies.end(), id,
-                                   [](const Body& body, BodyId wanted) { return body.id < wanted; });
-  return it != scene.bodies.end() && it->id == id ? &*it : nullptr;
-}
-
 MaybeProblem ends_problem(const Scene& scene, const Joint& joint) {
-  const Body* const a = find(scene, joint.a);
+  const Body* const a = find_body(scene, joint.a);
   if (!a) return Problem{"body_a", "names no body of this scene: " + std::to_string(joint.a)};
   if (a->is_static) return Problem{"body_a", "must be a dynamic body"};
-  const Body* const b = find(scene, joint.b);
+  const Body* const b = find_body(scene, joint.b);
   if (joint.b != kWorldBody && !b) return Problem{"body_b", "names no body of this scene: " + std::to_string(joint.b)};
   if (a == b) return Problem{"body_b", "must be another body than body_a"};
   if (b && !b->is_static && joint.b < joint.a) return Problem{"body_b", "must have a higher id than body_a"};
@@ -71,13 +65,13 @@ MaybeProblem ends_problem(const Scene& scene, const Joint& joint) {
 
 std::optional<Problem> problem_in(const Joint& joint) {
   if (auto p = name_problem(joint.name)) return p;
-  if (joint.kind > JointKind::kDistance) return Problem{"", "is of no known kind"};
+  if (joint.kind > JointKind::kUniversal) return Problem{"", "is of no known kind"};
   if (auto p = pose_problem("frame_a", joint.frame_a)) return p;
   if (auto p = pose_problem("frame_b", joint.frame_b)) return p;
   const std::string kind = name_of(joint.kind);
   const std::string limits = kind + (joint.kind == JointKind::kBall ? ".twist_limits" : ".limits");
   if (joint.limits) {
-    if (joint.kind == JointKind::kFixed) return Problem{kind, "has no limits"};
+    if (joint.kind == JointKind::kFixed || joint.kind == JointKind::kUniversal) return Problem{kind, "has no limits"};
     if (auto p = limits_problem(limits, joint.kind, *joint.limits)) return p;
   } else if (joint.kind == JointKind::kSlider || joint.kind == JointKind::kDistance) {
     return Problem{limits, "must be given"};
@@ -91,6 +85,7 @@ std::optional<Problem> problem_in(const Joint& joint) {
     if (!has_axis(joint.kind)) return Problem{kind, "has no motor: only a hinge, a slider and a distance have"};
     if (auto p = motor_problem(kind + ".motor", joint.kind, *joint.motor)) return p;
   }
+  if (joint.spring && joint.kind == JointKind::kUniversal) return Problem{kind, "has no spring"};
   return joint.spring ? spring_problem(kind + ".spring", *joint.spring) : std::nullopt;
 }
 

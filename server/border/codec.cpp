@@ -1,4 +1,5 @@
 #include "server/border/codec.h"
+#include "server/physics/tuning.h"
 
 #include <algorithm>
 #include <bit>
@@ -73,7 +74,8 @@ void check(const BodyState& body, const physics::Model& model) {
   if (!model.find(body.id)) throw CodecError(name(body.id) + ": not in the scene");
   if (!finite(body.position, 13)) throw CodecError(name(body.id) + ": not finite");
   if (!unit(body.orientation)) throw CodecError(name(body.id) + ": orientation is not a unit quaternion");
-  if (body.flags & ~std::uint32_t{kAsleep | 7u * kDriveReversed}) throw CodecError(name(body.id) + ": unknown flags");
+  if (body.flags & ~std::uint32_t{kAsleep | 7u * kDriveReversed | 7u * kStiffness}) throw CodecError(name(body.id) + ": unknown flags");
+  if (body.stiffness() > physics::kMostSubstepLevel) throw CodecError(name(body.id) + ": stiffer than anything is");
 }
 
 void check(const ContactRecord& record, const physics::Model& model) {

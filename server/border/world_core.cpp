@@ -28,6 +28,7 @@ class WorldCore::Impl final : timeline::Arbiter {
         announcer_(context_),
         settler_(context_),
         timeline_(model, settings.me, links_.size(), *this) {
+    timeline_.stepper().timing = settings.measure;
     final_ = 0;  // the scene
     closed_ = settings.actions ? 0 : std::numeric_limits<Step>::max();
   }
@@ -319,6 +320,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     stats_.steps = static_cast<std::uint64_t>(timeline_.newest());
     stats_.clamped = timeline_.stepper().counters.clamped;
     stats_.non_finite = timeline_.stepper().counters.non_finite;
+    stats_.shares = timeline_.stepper().shares;
     stats_.timeline = timeline_.stats();
     return stats_;
   }

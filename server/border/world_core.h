@@ -33,6 +33,7 @@ struct CoreSettings {
   Step last_step = 0;         // the run ends when this step is final
   Sync sync = Sync::kAnticipative;
   Step window = 48;      // K: steps beyond the final one that may be computed
+  bool measure = false;  // keep the CPU time of CoreStats::shares
   bool actions = false;  // no step becomes final before close_actions() has said that nothing will be done at it
 };
 
@@ -55,6 +56,7 @@ struct CoreStats {
   std::uint64_t actions = 0;      // entries of the action log acted on
   std::uint64_t held_back = 0;    // messages that came before actions which they presuppose
   std::uint64_t anticipated = 0;  // steps computed before all neighbours were known to have reached them
+  physics::ModelShares shares;    // how islands were solved
   timeline::TimelineStats timeline;
 };
 

@@ -26,6 +26,12 @@ std::uint64_t mix(std::uint64_t h) {
   return h ^ (h >> 32);
 }
 
+// As Aabb::overlaps, in one go.
+bool overlap(const Aabb& a, const Aabb& b) {
+  return (a.min.x() <= b.max.x()) & (b.min.x() <= a.max.x()) & (a.min.y() <= b.max.y()) & (b.min.y() <= a.max.y()) &
+         (a.min.z() <= b.max.z()) & (b.min.z() <= a.max.z());
+}
+
 bool wanted(std::uint8_t a, std::uint8_t b) {
   return ((a | b) & kRoleAwake) != 0 && (((a | b) & kRoleWanted) != 0 || (a & b & kRoleWide) != 0);
 }
@@ -81,15 +87,24 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
   const auto record = [&](std::uint32_t a, std::uint32_t b) {
     found_.push_back(a < b ? std::uint64_t{a} << 32 | b : std::uint64_t{b} << 32 | a);
   };
-  const auto scan = [&](const Entry& entry, std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t from,
-                        auto&& skip) {
-    const std::uint64_t k = bucket(x, y, z);
-    for (std::uint32_t o = std::max(first_of(k), from), end = end_of(k); o < end; ++o) {
-      const Entry& other = entries_[o];
-      if (other.x != x || other.y != y || other.z != z) continue;  // another cell in this bucket
-      if (!skip(o, other) && wanted(entry.role, other.role) && entry.box.overlaps(other.box))
-        record(entry.body, other.body);
-    }
+  // Of the cells x0 to x1 of a row the entries from number `from` on. They lie next to each other, but where the table
+  // begins anew.
+  const auto scan = [&](const Entry& entry, std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z,
+                        std::uint32_t from, auto&& skip) {
+    const std::uint64_t k = bucket(x0, y, z);
+    const auto width = static_cast<std::uint32_t>(x1 - x0);
+    const auto look = [&](std::uint64_t first, std::uint64_t last) {
+      for (std::uint32_t o = std::max(first_of(first), from), end = end_of(last); o < end; ++o) {
+        const Entry& other = entries_[o];
+        // Without branches that nobody can foretell. Buckets hold other cells, too.
+        const bool here = (other.y == y) & (other.z == z) & (static_cast<std::uint32_t>(other.x - x0) <= width);
+        if (here & overlap(entry.box, other.box) && !skip(o, other) && wanted(entry.role, other.role))
+          record(entry.body, other.body);
+      }
+    };
+    if (k + width <= mask) return look(k, k + width);
+    look(k, mask);
+    look(0, k + width - mask - 1);
   };
   const auto awake = [](const Entry& e) { return (e.role & kRoleAwake) != 0; };
   const auto number_awake = static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), awake));
@@ -100,9 +115,8 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
       if (!awake(entry)) continue;
       for (std::int32_t z = entry.z - 1; z <= entry.z + 1; ++z)
         for (std::int32_t y = entry.y - 1; y <= entry.y + 1; ++y)
-          for (std::int32_t x = entry.x - 1; x <= entry.x + 1; ++x)
-            scan(entry, x, y, z, 0,
-                 [&](std::uint32_t o, const Entry& other) { return o == e || (o < e && awake(other)); });
+          scan(entry, entry.x - 1, entry.x + 1, y, z, 0,
+               [&](std::uint32_t o, const Entry& other) { return o == e || (o < e && awake(other)); });
     }
   } else {
     // Half of the neighbourhood: the own cell (later entries), the next in the row, and four rows of three.
@@ -110,10 +124,10 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
     const auto none = [](std::uint32_t, const Entry&) { return false; };
     for (std::uint32_t e = 0; e < entries_.size(); ++e) {
       const Entry& entry = entries_[e];
-      scan(entry, entry.x, entry.y, entry.z, e + 1, none);
-      scan(entry, entry.x + 1, entry.y, entry.z, 0, none);
+      scan(entry, entry.x, entry.x, entry.y, entry.z, e + 1, none);
+      scan(entry, entry.x + 1, entry.x + 1, entry.y, entry.z, 0, none);
       for (const auto& row : kRows)
-        for (int d = -1; d <= 1; ++d) scan(entry, entry.x + d, entry.y + row[0], entry.z + row[1], 0, none);
+        scan(entry, entry.x - 1, entry.x + 1, entry.y + row[0], entry.z + row[1], 0, none);
     }
   }
   for (std::uint32_t l : large_)

@@ -11,7 +11,6 @@ namespace soda::physics {
 StepConstants::StepConstants(const Scene& scene)
     : dt(scene.dt),
       substeps(scene.substeps),
-      h(scene.dt / scene.substeps),
       gravity(scene.gravity),
       up(scene.gravity.isZero(0) ? Vec3(Vec3::Zero()) : Vec3(-scene.gravity / scene.gravity.norm())),
       max_speed(scene.max_speed),
@@ -34,6 +33,12 @@ Vec3 drive_target(const Drive& drive, const Vec3& x, std::uint32_t& flags) {
     target[axis] = t;
   }
   return target;
+}
+
+// Of a product of unit quaternions: a step of Newton's towards 1 / length, without root or division.
+Quat kept_unit(const Quat& q) {
+  const double scale = 1.5 - 0.5 * (q.x() * q.x() + q.y() * q.y() + q.z() * q.z() + q.w() * q.w());
+  return Quat(scale * q.w(), scale * q.x(), scale * q.y(), scale * q.z());
 }
 
 void limit_speed(MovingBody& body, double max_speed) {
@@ -88,7 +93,7 @@ void move(MovingBody& body, double h, const StepConstants& constants) {
   body.turned += turn;
   const bool gyroscopic = !body.model->isotropic && turn.squaredNorm() > kGyroscopicAngle * kGyroscopicAngle;
   if (!gyroscopic) {
-    body.q = normalized(rotation_of(turn) * body.q);
+    body.q = kept_unit(rotation_of(turn) * body.q);
     return;
   }
   // Angular momentum L is kept in the world frame. The implicit midpoint rule on the rotation group: the turn over h is
@@ -101,11 +106,11 @@ void move(MovingBody& body, double h, const StepConstants& constants) {
   const Vec3 momentum = body.q * (inertia * (body.q.conjugate() * body.w));
   Vec3 w = body.w;
   for (int i = 0; i < kMidpointIterations; ++i) w = spin_at(rotation_of(0.5 * h * w) * body.q, momentum);
-  body.q = normalized(rotation_of(h * w) * body.q);
+  body.q = kept_unit(rotation_of(h * w) * body.q);
   body.w = spin_at(body.q, momentum);
 }
 
-void fly(MovingBody& body, const StepConstants& constants) {
+void fly(MovingBody& body, std::uint32_t substeps, const StepConstants& constants) {
   const Vec3 before = body.v;
   accelerate(body, constants.dt, constants);
   limit_speed(body, constants.max_speed);
@@ -114,10 +119,7 @@ void fly(MovingBody& body, const StepConstants& constants) {
   const Vec3 after = body.v;
   body.v = Vec3::Zero();  // `move` is for the rotation alone here
   const Vec3 moved = body.moved;
-  if (body.model->isotropic)
-    move(body, constants.dt, constants);
-  else
-    for (std::uint32_t i = 0; i < constants.substeps; ++i) move(body, constants.h, constants);
+  for (std::uint32_t i = 0; i < substeps; ++i) move(body, constants.dt / substeps, constants);
   body.v = after;
   body.moved = moved;
 }

@@ -12,9 +12,8 @@ namespace soda::physics {
 // What every island's step needs to know of the scene.
 struct StepConstants {
   explicit StepConstants(const Scene& scene);
-  double dt;  // s
-  std::uint32_t substeps;
-  double h;          // s, one sub-step
+  double dt;               // s
+  std::uint32_t substeps;  // 0: chosen for each island
   Vec3 gravity;      // m/s^2
   Vec3 up;           // unit, against gravity; zero without gravity
   double max_speed;  // m/s
@@ -53,8 +52,8 @@ void accelerate(MovingBody& body, double h, const StepConstants& constants);
 void move(MovingBody& body, double h, const StepConstants& constants);
 
 // A body that touches nothing: exact ballistic flight over the whole step (without damping and drive), rotation as
-// above.
-void fly(MovingBody& body, const StepConstants& constants);
+// above, in so many sub-steps.
+void fly(MovingBody& body, std::uint32_t substeps, const StepConstants& constants);
 
 // Writes the result into `state`, its velocity limited to max_speed whatever contacts made of it, with flags of the
 // drive and the quiet counter; returns false where the result is not finite: the body then keeps its pose and stops.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "server/physics/solver_kernel.h"
 #include "server/physics/tuning.h"
@@ -46,14 +47,19 @@ End end_of(const Pose& in_world) {
 // An angle as near to the middle of its limits as whole turns can bring it: so that what overshoots a limit is brought
 // back to that one.
 double unwound(double angle, const std::optional<JointLimits>& limits) {
-  constexpr double kPi = 3.14159265358979323846;
+  using std::numbers::pi;
   const double middle = limits ? 0.5 * (limits->lower + limits->upper) : 0;
-  if (angle - middle > kPi) return angle - 2 * kPi;
-  if (angle - middle < -kPi) return angle + 2 * kPi;
+  if (angle - middle > pi) return angle - 2 * pi;
+  if (angle - middle < -pi) return angle + 2 * pi;
   return angle;
 }
 
 }  // namespace
+
+void JointSolver::clear(std::uint32_t substeps) {
+  used_ = 0;
+  substeps_ = substeps;
+}
 
 void JointSolver::add(const JointModel& model, std::uint32_t a, std::uint32_t b, std::uint32_t index,
                       const ContactRecord& record) {
@@ -63,19 +69,22 @@ void JointSolver::add(const JointModel& model, std::uint32_t a, std::uint32_t b,
   work.a = a;
   work.b = b;
   work.index = index;
-  work.linear = vec(record.points[0].arm_a);
-  work.angular = vec(record.points[0].arm_b);
+  const double share = 1.0 / substeps_;
+  work.linear = share * vec(record.points[0].arm_a);
+  work.angular = share * vec(record.points[0].arm_b);
   work.extra = {record.points[0].impulse, record.friction[0], record.friction[1], record.friction[2], record.twist};
+  for (double& impulse : work.extra) impulse *= share;
 }
 
 void JointSolver::store(std::span<ContactRecord> records) const {
+  const double whole = substeps_;
   for (const Work& work : std::span(work_).first(used_)) {
     ContactRecord& record = records[work.index];
-    put(work.linear, record.points[0].arm_a);
-    put(work.angular, record.points[0].arm_b);
-    record.points[0].impulse = work.extra[kLower];
-    for (int i = 0; i < 3; ++i) record.friction[i] = work.extra[static_cast<std::size_t>(kUpper + i)];
-    record.twist = work.extra[kCone];
+    put(whole * work.linear, record.points[0].arm_a);
+    put(whole * work.angular, record.points[0].arm_b);
+    record.points[0].impulse = whole * work.extra[kLower];
+    for (int i = 0; i < 3; ++i) record.friction[i] = whole * work.extra[static_cast<std::size_t>(kUpper + i)];
+    record.twist = whole * work.extra[kCone];
   }
 }
 
@@ -84,7 +93,7 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
   const Joint& joint = *model.joint;
   const End a = end_of(bodies[work.a], model.at_a);
   const End b = work.b == kNoBody ? end_of(model.at_b) : end_of(bodies[work.b], model.at_b);
-  const double linear_mass = a.inverse_mass + b.inverse_mass;
+  const double linear_mass = work.linear_mass = a.inverse_mass + b.inverse_mass;
   const Vec3 apart = b.place - a.place;
   const Vec3 half = work.b == kNoBody ? Vec3(Vec3::Zero()) : Vec3(0.5 * apart);
   // Both bodies are pushed in one place, half way between (of a static one it does not matter): turning momentum is
@@ -125,7 +134,7 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
   Quat turn = a.frame.conjugate() * b.frame;
   if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
 
-  if (joint.kind == JointKind::kFixed || joint.kind == JointKind::kBall || joint.kind == JointKind::kHinge)
+  if (joint.kind != JointKind::kSlider && joint.kind != JointKind::kDistance)
     for (int i = 0; i < 3; ++i) hold(linear_row(Vec3::Unit(i)), apart[i]);
   switch (joint.kind) {
     case JointKind::kFixed: {
@@ -148,6 +157,11 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
         extra(kLower, row, twist - joint.limits->lower);
         extra(kUpper, row, twist - joint.limits->upper);
       }
+      break;
+    }
+    case JointKind::kUniversal: {
+      const Vec3 x_a = axes_a.col(0), y_b = b.frame * Vec3::UnitY();
+      hold(angular_row(y_b.cross(x_a)), x_a.dot(y_b));
       break;
     }
     case JointKind::kHinge: {
@@ -173,21 +187,20 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
       break;
     }
   }
+}
 
-  for (int i = 0; i < work.held; ++i)
-    for (int j = 0; j <= i; ++j) {
-      double sum = response(work.row[i], work.row[j], linear_mass);
-      for (int k = 0; k < j; ++k) sum -= work.factor[i][k] * work.factor[j][k];
-      work.factor[i][j] = i == j ? std::sqrt(std::max(sum, 1e-300)) : sum / work.factor[j][j];
-    }
+void JointSolver::prepare(std::span<const MovingBody> bodies) {
+  for (Work& work : std::span(work_).first(used_)) prepare(work, bodies);
+  for (const Cluster& cluster : clusters_) couple(cluster, bodies);
 }
 
 void JointSolver::begin(std::span<MovingBody> bodies, double h) {
   if (used_ == 0) return;
   h_ = h;
   stiff_ = soften(kJointHertzPerSubstepRate / h, kJointDampingRatio, h);
+  stiff_whole_ = soften(kDirectHertzPerSubstepRate / h, kJointDampingRatio, h);
+  prepare(bodies);
   for (Work& work : std::span(work_).first(used_)) {
-    prepare(work, bodies);
     MovingBody& a = bodies[work.a];
     MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
     const auto push = [&](const Line& row, double impulse) { push_along(row, impulse, a, b); };
@@ -212,13 +225,15 @@ void JointSolver::begin(std::span<MovingBody> bodies, double h) {
 }
 
 void JointSolver::pass(std::span<MovingBody> bodies, bool bias) {
-  for (Work& work : std::span(work_).first(used_)) {
-    if (!bias) prepare(work, bodies);  // they have moved
-    solve(work, bodies, bias);
+  if (used_ == 0) return;
+  if (!bias) prepare(bodies);  // they have moved
+  for (const Cluster& cluster : clusters_) {
+    for (std::uint32_t k = cluster.first; k < cluster.end; ++k) push_extras(work_[order_[k]], bodies, bias);
+    push_held(cluster, bodies, bias);
   }
 }
 
-void JointSolver::solve(Work& work, std::span<MovingBody> bodies, bool bias) const {
+void JointSolver::push_extras(Work& work, std::span<MovingBody> bodies, bool bias) const {
   const Joint& joint = *work.model->joint;
   MovingBody& a = bodies[work.a];
   MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
@@ -233,7 +248,6 @@ void JointSolver::solve(Work& work, std::span<MovingBody> bodies, bool bias) con
     sum = now;
   };
   constexpr Softness kRigid{0, 1, 0};
-  const bool holds_softly = joint.spring && (joint.kind == JointKind::kFixed || joint.kind == JointKind::kBall);
 
   if (work.used[kSpring]) {
     const Softness soft = soften(joint.spring->frequency, joint.spring->damping_ratio, h_);
@@ -256,33 +270,47 @@ void JointSolver::solve(Work& work, std::span<MovingBody> bodies, bool bias) con
   limit(kLower, 1);
   limit(kUpper, -1);
   limit(kCone, -1);
+}
 
-  if (work.held == 0) return;
-  const Softness soft = holds_softly ? soften(joint.spring->frequency, joint.spring->damping_ratio, h_)
-                        : bias       ? stiff_
-                                     : kRigid;
-  double x[kHeld];
-  for (int i = 0; i < work.held; ++i) {  // forward ...
-    double sum = speed_along(work.row[i], a, b) + soft.bias_rate * work.error[i];
-    for (int k = 0; k < i; ++k) sum -= work.factor[i][k] * x[k];
-    x[i] = sum / work.factor[i][i];
+void JointSolver::push_held(const Cluster& cluster, std::span<MovingBody> bodies, bool bias) {
+  const Work& first = work_[order_[cluster.first]];
+  const Work& last = work_[order_[cluster.end - 1]];
+  const std::uint32_t begin = first.first_row, end = last.first_row + static_cast<std::uint32_t>(last.held);
+  if (begin == end) return;
+  // What holds softly is alone in its cluster.
+  constexpr Softness kRigid{0, 1, 0};
+  const Joint& joint = *first.model->joint;
+  const Softness soft = holds_softly(joint) ? soften(joint.spring->frequency, joint.spring->damping_ratio, h_)
+                        : !bias             ? kRigid
+                        : cluster.whole     ? stiff_whole_
+                                            : stiff_;
+  const std::span x(solution_.data(), end - begin);
+  for (std::uint32_t k = cluster.first; k < cluster.end; ++k) {
+    const Work& work = work_[order_[k]];
+    const MovingBody& a = bodies[work.a];
+    const MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
+    for (int i = 0; i < work.held; ++i)
+      x[work.first_row - begin + static_cast<std::uint32_t>(i)] =
+          speed_along(work.row[i], a, b) + soft.bias_rate * work.error[i];
   }
-  for (int i = work.held - 1; i >= 0; --i) {  // ... and back
-    double sum = x[i];
-    for (int k = i + 1; k < work.held; ++k) sum -= work.factor[k][i] * x[k];
-    x[i] = sum / work.factor[i][i];
+  matrix_.solve(begin, end, x);
+  for (std::uint32_t k = cluster.first; k < cluster.end; ++k) {
+    Work& work = work_[order_[k]];
+    MovingBody& a = bodies[work.a];
+    MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
+    Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+    for (int i = 0; i < work.held; ++i) {
+      const Line& row = work.row[i];
+      const bool pushes = !row.linear.isZero(0);
+      const double before = pushes ? row.linear.dot(work.linear) : row.a_turn.dot(work.angular);
+      const double impulse =
+          -soft.mass_scale * x[work.first_row - begin + static_cast<std::uint32_t>(i)] - soft.impulse_scale * before;
+      push_along(row, impulse, a, b);
+      (pushes ? linear : angular) += impulse * (pushes ? row.linear : row.a_turn);
+    }
+    work.linear += linear;
+    work.angular += angular;
   }
-  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
-  for (int i = 0; i < work.held; ++i) {
-    const Line& row = work.row[i];
-    const bool pushes = !row.linear.isZero(0);
-    const double before = pushes ? row.linear.dot(work.linear) : row.a_turn.dot(work.angular);
-    const double impulse = -soft.mass_scale * x[i] - soft.impulse_scale * before;
-    push(row, impulse);
-    (pushes ? linear : angular) += impulse * (pushes ? row.linear : row.a_turn);
-  }
-  work.linear += linear;
-  work.angular += angular;
 }
 
 }  // namespace soda::physics

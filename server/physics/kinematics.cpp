@@ -1,11 +1,12 @@
 #include "server/physics/kinematics.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace soda::physics {
 namespace {
 
-constexpr double kFullTurn = 6.28318530717958647693;
+constexpr double kFullTurn = 2 * std::numbers::pi;
 
 Pose pose_at(const Body& body, double time) {
   const PrescribedMotion& motion = *body.motion;

@@ -73,9 +73,7 @@ void Model::add_joints() {
     const Pose unit{frame.position, normalized(frame.orientation)};
     if (id == kWorldBody) return unit;
     if (const StaticModel* const fixed = find_static(id)) return fixed->pose * unit;
-    const auto body = std::lower_bound(scene_.bodies.begin(), scene_.bodies.end(), id,
-                                       [](const Body& b, BodyId i) { return b.id < i; });
-    return Pose{unit.position - body->inertial.centre, unit.orientation};
+    return Pose{unit.position - find_body(scene_, id)->inertial.centre, unit.orientation};
   };
   for (const Joint& joint : scene_.joints) {
     const bool moves = joint.b != kWorldBody && find(joint.b);
@@ -138,6 +136,9 @@ void Model::add_dynamic(const Scene& scene, const Body& body) {
   m.inner_extent = m.radius;
   for (const Child& child : shapes_.children(first, children))
     m.inner_extent = std::min(m.inner_extent, child.inner_extent);
+  m.inverse_inner_extent = 1 / m.inner_extent;
+  const Child& only = shapes_.children(first, 1)[0];
+  m.is_ball = children == 1 && only.kind == ShapeKind::kSphere && only.pose.position.isZero(0);
   m.drive = body.drive ? &*body.drive : nullptr;
   if (body.motion) {
     m.kinematic = &body;

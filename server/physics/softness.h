@@ -2,6 +2,8 @@
 // (E. Catto, "Solver2D", 2024, and "Soft Constraints", GDC 2011).
 #pragma once
 
+#include <numbers>
+
 namespace soda::physics {
 
 struct Softness {
@@ -12,7 +14,7 @@ struct Softness {
 
 // `hertz` > 0, `damping` the ratio to critical, `h` the sub-step in s.
 inline Softness soften(double hertz, double damping, double h) {
-  const double omega = 2 * 3.14159265358979323846 * hertz;
+  const double omega = 2 * std::numbers::pi * hertz;
   const double a1 = 2 * damping + h * omega, a2 = h * omega * a1, a3 = 1 / (1 + a2);
   return {omega / a1, a2 * a3, a3};
 }

@@ -27,11 +27,16 @@ static_assert(offsetof(MovingBody, v) == offsetof(Motion, v) && offsetof(MovingB
 
 }  // namespace
 
-Softness IslandSolver::softness(bool with_static) const {
-  double hertz = std::min(kContactHertzCap, kContactHertzPerSubstepRate / constants_.h);
-  double damping = kContactDampingRatio;
-  if (with_static) hertz *= kStaticHertzFactor, damping *= kStaticDampingFactor;
-  return soften(hertz, damping, constants_.h);
+void IslandSolver::tune(std::uint32_t substeps) {
+  if (substeps == substeps_) return;
+  substeps_ = substeps;
+  h_ = constants_.dt / substeps;
+  for (std::uint32_t level = 0; level <= kMostSubstepLevel; ++level) {
+    const double rate = (level == 0 ? substeps : 1u << level) / constants_.dt;
+    const double hertz = std::min(kContactHertzCap, kContactHertzPerSubstepRate * rate);
+    soft_[level][0] = soften(hertz, kContactDampingRatio, h_);
+    soft_[level][1] = soften(kStaticHertzFactor * hertz, kStaticDampingFactor * kContactDampingRatio, h_);
+  }
 }
 
 std::pair<Batch*, int> IslandSolver::lane_for(std::uint32_t a, std::uint32_t b) {
@@ -57,7 +62,8 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
                            const Surface& surface, const ContactRecord& record, Batch& batch, int lane) const {
   const MovingBody& a = bodies[slot_a];
   const MovingBody* const b = slot_b == kNoBody ? nullptr : &bodies[slot_b];
-  const Softness& soft = b ? soft_ : soft_static_;
+  const Softness& soft = soft_[surface.stiffness][b ? 0 : 1];
+  const double share = 1.0 / substeps_;  // of what the record carried in a step
   batch.a[lane] = slot_a;
   batch.b[lane] = slot_b;
   batch.count[lane] = record.count;
@@ -120,7 +126,7 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
     ra[k] = vec(record.points[k].arm_a);
     rb[k] = vec(record.points[k].arm_b);
     separations[k] = normal.dot(b_minus_a + turn_b * rb[k] - turn_a * ra[k]);
-    impulses[k] = record.points[k].impulse;
+    impulses[k] = share * record.points[k].impulse;
     carried += impulses[k];
     ra[k] += shift;
     rb[k] -= shift;
@@ -148,7 +154,7 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
     const Vec3 arm = ra[k] - centre_a;
     batch.point[k].arm[lane] = (arm - normal.dot(arm) * normal).norm();
   }
-  const Vec3 friction = vec(record.friction);
+  const Vec3 friction = share * vec(record.friction);
   Made slide[2];
   for (int t = 0; t < 2; ++t) {
     slide[t] = make_row(centre_a, centre_b, tangent[t], batch.slide[t]);
@@ -168,7 +174,7 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
   put(batch.b_twist, lane, b_twist);
   if (record.count < 2) return;  // a single point does not hold against turning
   batch.twist_mass[lane] = inverse_or_zero(normal.dot(a_twist + b_twist));
-  batch.twist_impulse[lane] = record.twist;
+  batch.twist_impulse[lane] = share * record.twist;
 }
 
 void IslandSolver::settle_torques(std::span<MovingBody> bodies) const {
@@ -185,25 +191,27 @@ void IslandSolver::settle_torques(std::span<MovingBody> bodies) const {
 }
 
 void IslandSolver::store(std::span<ContactRecord> records) const {
+  const double whole = substeps_;
   for (std::size_t i = 0; i < used_; ++i) {
     const Batch& batch = batches_[i];
     for (int l = 0; l < kLanes; ++l) {
       if (batch.record[l] == kNoBody) continue;
       ContactRecord& record = records[batch.record[l]];
-      for (std::uint32_t k = 0; k < record.count; ++k) record.points[k].impulse = batch.point[k].impulse[l];
-      const Vec3 friction =
-          batch.slide_impulse[0][l] * get(batch.tangent[0], l) + batch.slide_impulse[1][l] * get(batch.tangent[1], l);
+      for (std::uint32_t k = 0; k < record.count; ++k) record.points[k].impulse = whole * batch.point[k].impulse[l];
+      const Vec3 friction = (whole * batch.slide_impulse[0][l]) * get(batch.tangent[0], l) +
+                            (whole * batch.slide_impulse[1][l]) * get(batch.tangent[1], l);
       for (int axis = 0; axis < 3; ++axis) record.friction[axis] = friction[axis];
-      record.twist = batch.twist_impulse[l];
+      record.twist = whole * batch.twist_impulse[l];
     }
   }
 }
 
-void IslandSolver::solve(std::span<MovingBody> bodies, std::span<const std::uint32_t> slot_of,
+void IslandSolver::solve(std::uint32_t substeps, std::span<MovingBody> bodies, std::span<const std::uint32_t> slot_of,
                          std::span<const std::uint32_t> contacts, std::span<const Ends> ends,
                          std::span<const Surface> surfaces, std::span<ContactRecord> records) {
+  tune(substeps);
   used_ = 0;
-  joints_.clear();
+  joints_.clear(substeps);
   for (const std::uint32_t index : contacts) {
     const std::uint32_t a = slot_of[ends[index].a];
     const std::uint32_t b = ends[index].b == kStaticSlot ? kNoBody : slot_of[ends[index].b];
@@ -215,20 +223,21 @@ void IslandSolver::solve(std::span<MovingBody> bodies, std::span<const std::uint
     batch->record[lane] = index;
     prepare(bodies, a, b, surfaces[index], records[index], *batch, lane);
   }
+  joints_.arrange(bodies);
   const Bodies moving{reinterpret_cast<std::byte*>(bodies.data()), sizeof(MovingBody)};
   const bool bounces = std::any_of(batches_.begin(), batches_.begin() + static_cast<std::ptrdiff_t>(used_),
                                    [](const Batch& batch) { return batch.bounces; });
   const double gravity = constants_.gravity.norm();
-  for (std::uint32_t i = 0; i < constants_.substeps; ++i) {
-    if (bounces) strike(std::span(batches_).first(used_), bodies, constants_.h, gravity);
-    for (MovingBody& body : bodies) accelerate(body, constants_.h, constants_);
-    joints_.begin(bodies, constants_.h);
+  for (std::uint32_t i = 0; i < substeps; ++i) {
+    if (bounces) strike(std::span(batches_).first(used_), bodies, h_, gravity);
+    for (MovingBody& body : bodies) accelerate(body, h_, constants_);
+    joints_.begin(bodies, h_);
     kernel_->warm_start(batches_.data(), used_, moving);
     joints_.pass(bodies, true);
-    kernel_->pass(batches_.data(), used_, moving, 1 / constants_.h, true);
-    for (MovingBody& body : bodies) move(body, constants_.h, constants_);
+    kernel_->pass(batches_.data(), used_, moving, 1 / h_, true);
+    for (MovingBody& body : bodies) move(body, h_, constants_);
     joints_.pass(bodies, false);
-    kernel_->pass(batches_.data(), used_, moving, 1 / constants_.h, false);
+    kernel_->pass(batches_.data(), used_, moving, 1 / h_, false);
   }
   settle_torques(bodies);
   store(records);

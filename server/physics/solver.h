@@ -14,6 +14,7 @@
 #include "server/physics/joints.h"
 #include "server/physics/softness.h"
 #include "server/physics/solver_kernel.h"
+#include "server/physics/tuning.h"
 
 namespace soda::physics {
 
@@ -23,6 +24,7 @@ struct Surface {
   // How much of the place of contact's motion against the bodies is against a: nothing of round bodies, which roll on
   // under it, and all of what they roll on.
   double moves_on_a = 0.5;
+  std::uint32_t stiffness = 0;  // see Choice
   const StaticModel* fixed = nullptr;  // b, where it is static
   const JointModel* joint = nullptr;   // or, instead of all of these, the joint that the record is of
 };
@@ -30,17 +32,20 @@ struct Surface {
 class IslandSolver {
  public:
   // `constants` must outlive the solver.
-  explicit IslandSolver(const StepConstants& constants)
-      : constants_(constants), soft_(softness(false)), soft_static_(softness(true)) {}
+  IslandSolver(const StepConstants& constants, JointMethod joints) : constants_(constants), joints_(joints) {}
+
+  // Joints solved since the start, as a whole with others and alone.
+  std::uint64_t joints_together() const { return joints_.together; }
+  std::uint64_t joints_alone() const { return joints_.alone; }
 
   // Another kernel than the machine's best, for comparisons.
   void use(const Kernel& kernel) { kernel_ = &kernel; }
 
-  // Advances the bodies of some awake islands by one step. `contacts` are positions in `records` (with `ends` and
+  // Advances the bodies of some awake islands by one step of `substeps` sub-steps. `contacts` are positions in `records` (with `ends` and
   // `surfaces` alongside), each island's in its solving order; between islands, which share no moving body, any order
   // gives the same bits, and mixing them fills the lanes. `slot_of` maps a body's position in `ends` to its position in
   // `bodies`. Impulses are written back into `records`.
-  void solve(std::span<MovingBody> bodies, std::span<const std::uint32_t> slot_of,
+  void solve(std::uint32_t substeps, std::span<MovingBody> bodies, std::span<const std::uint32_t> slot_of,
              std::span<const std::uint32_t> contacts, std::span<const Ends> ends, std::span<const Surface> surfaces,
              std::span<ContactRecord> records);
 
@@ -52,10 +57,12 @@ class IslandSolver {
   // Pays what the contacts' places owe in angular momentum: see Batch::owed.
   void settle_torques(std::span<MovingBody> bodies) const;
   void store(std::span<ContactRecord> records) const;
-  Softness softness(bool with_static) const;
+  void tune(std::uint32_t substeps);
 
   const StepConstants& constants_;
-  Softness soft_, soft_static_;
+  std::uint32_t substeps_ = 0;
+  double h_ = 0;                                // s, one sub-step
+  Softness soft_[kMostSubstepLevel + 1][2] = {};  // by stiffness, and whether against a static body
   const Kernel* kernel_ = &chosen_kernel();
   JointSolver joints_;
   std::vector<Batch> batches_;

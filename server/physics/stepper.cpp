@@ -1,6 +1,7 @@
 #include "server/physics/stepper.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <ctime>
 #include <limits>
@@ -21,11 +22,13 @@ double cpu_seconds() {
 class StageClock {
  public:
   explicit StageClock(bool on) : on_(on), last_(on ? cpu_seconds() : 0) {}
-  void lap(double& sum) {
-    if (!on_) return;
-    const double now = cpu_seconds();
-    sum += now - last_;
+  // Adds the time since the last lap to the sum, and tells it.
+  double lap(double& sum) {
+    if (!on_) return 0;
+    const double now = cpu_seconds(), passed = now - last_;
+    sum += passed;
     last_ = now;
+    return passed;
   }
 
  private:
@@ -109,7 +112,8 @@ Stepper::Stepper(const Model& model)
       constants_(model.scene()),
       statics_(static_boxes(model), broad_cell(model)),
       order_(kBlockDiameters * model.largest_ordinary_diameter()),
-      solver_(constants_),
+      chooser_(model, constants_),
+      solver_(constants_, model.scene().joint_method),
       slots_(model.bodies().size(), kStaticSlot) {}
 
 std::uint32_t Stepper::slot_of(BodyId id) const {
@@ -288,52 +292,91 @@ void Stepper::find_islands(std::span<const BodyState> bodies, std::span<const Co
   clock.lap(times.islands);
 }
 
+// How each island is to be solved that is not asleep; those of equal sub-steps together.
+void Stepper::choose(std::span<const BodyState> bodies, std::span<const ContactRecord> contacts,
+                     std::span<const Ends> ends, const Islands& islands, std::span<const std::uint32_t> which) {
+  chosen_.clear();
+  chosen_models_.resize(bodies.size());
+  for (const std::uint32_t island : which) {
+    const auto members = islands.bodies_of(island);
+    if (std::all_of(members.begin(), members.end(), [&](std::uint32_t i) { return bodies[i].asleep(); })) continue;
+    for (const std::uint32_t i : members) chosen_models_[i] = model_.find(bodies[i].id);
+    const auto touching = islands.contacts_of(island);
+    const Choice choice = touching.empty()
+                              ? Choice{flight_substeps(bodies[members[0]], *chosen_models_[members[0]], constants_), 0}
+                              : chooser_.choose({members, touching, bodies, chosen_models_, contacts, ends});
+    chosen_.push_back({island, choice});
+  }
+  // In the order of memory otherwise.
+  const auto fewer = [](const Chosen& l, const Chosen& r) {
+    return l.choice.substeps != r.choice.substeps ? l.choice.substeps < r.choice.substeps : l.island < r.island;
+  };
+  if (!std::is_sorted(chosen_.begin(), chosen_.end(), fewer)) std::sort(chosen_.begin(), chosen_.end(), fewer);
+}
+
 void Stepper::solve(std::span<BodyState> bodies, std::span<ContactRecord> contacts, std::span<const Ends> ends,
                     const Islands& islands, std::span<const std::uint32_t> which) {
   StageClock clock(timing);
+  choose(bodies, contacts, ends, islands, which);
   centres_.resize(bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) centres_[i] = bodies[i].x();
   surfaces_.resize(contacts.size());
   island_slot_.resize(bodies.size());
+  std::uint32_t substeps = 0;  // of the group
   const auto solve_group = [&] {
+    if (group_.empty()) return;
     clock.lap(times.order);
     mix_group();
-    solver_.solve(std::span(moving_).first(moving_used_), island_slot_, mixed_, ends, surfaces_, contacts);
+    solver_.solve(substeps, std::span(moving_).first(moving_used_), island_slot_, mixed_, ends, surfaces_, contacts);
     for (const Grouped& one : group_) finish(bodies, contacts, islands, one);
+    ModelShare& share = shares.solved[std::min<std::size_t>(std::bit_width(substeps) - 1, kMostSubstepLevel)];
+    share.islands += group_.size();
+    share.bodies += moving_used_;
+    share.contacts += sorted_.size();
+    shares.joints_together = solver_.joints_together();
+    shares.joints_alone = solver_.joints_alone();
     group_.clear();
     sorted_.clear();
     moving_used_ = 0;
-    clock.lap(times.solve);
+    share.seconds += clock.lap(times.solve);
   };
-  for (const std::uint32_t island : which) {
+  for (const auto& [island, choice] : chosen_) {
+    if (choice.substeps != substeps) solve_group();
+    substeps = choice.substeps;
     const auto members = islands.bodies_of(island);
-    if (std::all_of(members.begin(), members.end(), [&](std::uint32_t i) { return bodies[i].asleep(); })) continue;
     const auto touching = islands.contacts_of(island);
     const Grouped one{island, static_cast<std::uint32_t>(moving_used_), static_cast<std::uint32_t>(sorted_.size()),
-                      static_cast<std::uint32_t>(touching.size())};
+                      static_cast<std::uint32_t>(touching.size()), choice.stiffness};
     moving_used_ += members.size();
     if (moving_used_ > moving_.size()) moving_.resize(std::max(moving_used_, 2 * moving_.size()));
     for (std::uint32_t k = 0; k < members.size(); ++k) {
       island_slot_[members[k]] = one.first_body + k;
       BodyState& state = bodies[members[k]];
       if (state.asleep()) state.quiet_steps = 0;  // woken: has to come to rest anew
-      begin_step(state, *model_.find(state.id), moving_[one.first_body + k]);
+      begin_step(state, *chosen_models_[members[k]], moving_[one.first_body + k]);
     }
     if (touching.empty()) {
-      fly(moving_[one.first_body], constants_);
+      fly(moving_[one.first_body], substeps, constants_);
       finish(bodies, contacts, islands, one);
       moving_used_ = one.first_body;
-      clock.lap(times.solve);
+      ++shares.flights.islands;
+      ++shares.flights.bodies;
+      shares.turning_flights += chosen_models_[members[0]]->isotropic ? 0 : 1;
+      shares.flights.seconds += clock.lap(times.solve);
       continue;
     }
-    for (const std::uint32_t c : touching) find_surface(contacts[c], ends[c], surfaces_[c]);
+    for (const std::uint32_t c : touching) {
+      find_surface(contacts[c], ends[c], surfaces_[c]);
+      surfaces_[c].stiffness = choice.stiffness;
+      shares.bouncing += !surfaces_[c].joint && surfaces_[c].restitution > 0 ? 1 : 0;
+    }
     sorted_.insert(sorted_.end(), touching.begin(), touching.end());
     order_.sort(std::span(sorted_).subspan(one.first_contact), ends, centres_);
     group_.push_back(one);
     ++counters.islands;
     if (sorted_.size() >= kGroupContacts) solve_group();
   }
-  if (!group_.empty()) solve_group();
+  solve_group();
 }
 
 void Stepper::find_surface(const ContactRecord& contact, const Ends& ends, Surface& surface) const {
@@ -390,6 +433,7 @@ void Stepper::finish(std::span<BodyState> bodies, std::span<ContactRecord> conta
   for (std::uint32_t k = 0; k < members.size(); ++k) {
     BodyState& state = bodies[members[k]];
     MovingBody& body = moving_[one.first_body + k];
+    state.set_stiffness(one.stiffness);
     if (!end_step(body, constants_, state)) {
       ++counters.non_finite;
       finite = false;

@@ -7,12 +7,14 @@
 // Any subset of the bodies that is closed (holds whole islands) gives the bits that the whole would give.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "common/body_set.h"
 #include "server/physics/broad_phase.h"
+#include "server/physics/choices.h"
 #include "server/physics/constraint_order.h"
 #include "server/physics/contact_update.h"
 #include "server/physics/integrator.h"
@@ -26,6 +28,21 @@ namespace soda::physics {
 // function of its state alone. Two bodies whose boxes do not overlap do not touch in this step.
 Aabb reach_box(const BodyState& state, const BodyModel& model, const Mat3& rotation, const Model& scene);
 Aabb reach_box(const BodyState& state, const Model& scene);
+
+// What was solved in one way, over all steps.
+struct ModelShare {
+  std::uint64_t islands = 0, bodies = 0, contacts = 0;  // contacts: records, those of joints included
+  double seconds = 0;  // CPU; only kept when timing is on
+};
+
+// Which ways islands were solved in, see choices.h.
+struct ModelShares {
+  ModelShare flights;                                     // bodies that touched nothing
+  std::array<ModelShare, kMostSubstepLevel + 1> solved;   // by the power of two that the sub-steps are, or lie below
+  std::uint64_t joints_together = 0, joints_alone = 0;    // solved as a whole with others; alone
+  std::uint64_t turning_flights = 0;                      // flights with gyroscopic terms
+  std::uint64_t bouncing = 0;                             // contacts of pairs that bounce
+};
 
 struct StepCounters {
   std::uint64_t clamped = 0;      // bodies slowed to the scene's largest speed
@@ -70,6 +87,7 @@ class Stepper {
   std::span<const Aabb> boxes() const { return boxes_; }
 
   StepCounters counters;
+  ModelShares shares;
   const ContactCounters& contact_counters() const { return updater_.counters; }
   bool timing = false;
   StageTimes times;
@@ -81,8 +99,14 @@ class Stepper {
   Party party(const BodyState& state, std::uint32_t slot) const;
   Party party(const StaticModel& fixed) const;
   struct Grouped {  // an island that is solved together with others
-    std::uint32_t island, first_body, first_contact, contacts;
+    std::uint32_t island, first_body, first_contact, contacts, stiffness;
   };
+  struct Chosen {
+    std::uint32_t island;
+    Choice choice;
+  };
+  void choose(std::span<const BodyState> bodies, std::span<const ContactRecord> contacts, std::span<const Ends> ends,
+              const Islands& islands, std::span<const std::uint32_t> which);
   void find_surface(const ContactRecord& contact, const Ends& ends, Surface& surface) const;
   void mix_group();
   void finish(std::span<BodyState> bodies, std::span<ContactRecord> contacts, const Islands& islands,
@@ -95,6 +119,7 @@ class Stepper {
   BroadPhase broad_;
   ContactUpdater updater_;
   ConstraintOrder order_;
+  Chooser chooser_;
   IslandSolver solver_;
   IslandFinder finder_;
 
@@ -112,6 +137,8 @@ class Stepper {
   std::vector<Vec3> centres_;
   std::vector<Surface> surfaces_;
   std::vector<std::uint32_t> island_slot_, all_;
+  std::vector<Chosen> chosen_;
+  std::vector<const BodyModel*> chosen_models_;
   std::vector<Grouped> group_, unmixed_;
   std::vector<std::uint32_t> sorted_, mixed_;  // contacts of the group: by island, and as they are solved
   std::vector<MovingBody> moving_;

@@ -1,6 +1,9 @@
 // Every number of the step that could have been another, with its unit and its reason.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+
 namespace soda::physics {
 
 // ---- contact finding
@@ -32,9 +35,21 @@ constexpr double kImpactReach = 1.001;  // of what is covered in a sub-step: who
 constexpr int kImpactIterations = 16;   // over the points of one manifold
 constexpr int kMostImpactRounds = 64;   // over an island, in one sub-step; what strikes later is stopped
 
+// ---- how many sub-steps an island gets, where its scene does not say
+constexpr std::uint32_t kLeastSubstepLevel = 1;  // 2 sub-steps ...
+constexpr std::uint32_t kMostSubstepLevel = 5;   // ... to 32
+constexpr double kSagShare = 0.1;   // of a body's smallest half extent, by which the contact that carries all above gives
+constexpr double kDepthRate = 60;   // 1/s; sub-steps per second and root of the contacts between a body and the ground
+constexpr double kSofterBelow = 0.4;  // contacts get softer again where less than this share of the sub-steps would do
+constexpr double kTurnPerSubstep = 0.25;       // rad
+constexpr double kSagitta = 1e-4;              // m; a body on a joint leaves its circle by this much in a sub-step
+constexpr double kMostSubstepsForTravel = 8;
+
 // ---- joints: stiffer than contacts, since both signs of an impulse are allowed
 constexpr double kJointHertzPerSubstepRate = 0.25;
+constexpr double kDirectHertzPerSubstepRate = 0.5;  // of joints that are solved as a whole; iterated ones would explode
 constexpr double kJointDampingRatio = 2;
+constexpr std::size_t kMostDirectWork = 200'000;  // operations; joints whose direct solution takes more are iterated
 
 // ---- integration
 constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning is taken as free of gyroscopic torque

@@ -55,6 +55,7 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core.last_step = settings.last_step;
   core.sync = settings.sync;
   core.window = settings.window;
+  core.measure = settings.measure;
   core.actions = true;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
@@ -227,6 +228,19 @@ wire::Status Daemon::status() const {
   getrusage(RUSAGE_SELF, &usage);
   s.cpu_seconds(seconds(usage.ru_utime) + seconds(usage.ru_stime));
   s.peak_memory(static_cast<std::uint64_t>(usage.ru_maxrss) * 1024);
+  const auto share = [&](std::size_t at, const physics::ModelShare& of) {
+    s.shares()[at].islands(of.islands);
+    s.shares()[at].bodies(of.bodies);
+    s.shares()[at].contacts(of.contacts);
+    s.shares()[at].seconds(of.seconds);
+  };
+  static_assert(std::tuple_size_v<std::remove_reference_t<decltype(s.shares())>> == 1 + std::tuple_size_v<decltype(stats.shares.solved)>);
+  share(0, stats.shares.flights);
+  for (std::size_t k = 0; k < stats.shares.solved.size(); ++k) share(k + 1, stats.shares.solved[k]);
+  s.joints_together(stats.shares.joints_together);
+  s.joints_alone(stats.shares.joints_alone);
+  s.turning_flights(stats.shares.turning_flights);
+  s.bouncing(stats.shares.bouncing);
   return s;
 }
 

@@ -34,6 +34,7 @@ struct DaemonSettings {
   Step window = 48;                      // K
   Step dump_first = -1, dump_last = -1;  // states to report; -1: none
   Step pose_every = 0;                   // steps whose poses are reported; 0: none
+  bool measure = false;                  // what each way of solving islands costs
 };
 
 class Daemon {

@@ -65,6 +65,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       ->capture_default_str();
   app.add_option("--expect-scene", expect, "refuse to run any other scene than that with this hash");
   app.add_flag("--verbose,-v", o.verbose, "say more");
+  app.add_flag("--explain", o.explain, "measure what each way of solving islands costs, for `soda run --explain`");
   const char* group = "World 0 only";
   app.add_option("--scene", o.scene, "scene file")->group(group);
   app.add_option("--worlds", o.worlds, "how many worlds")

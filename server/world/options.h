@@ -18,6 +18,7 @@ struct Options {
   std::uint64_t expect_scene = 0;  // hash; 0: any
   dds::NetworkOptions network;
   bool verbose = false;
+  bool explain = false;  // measure what each way of solving islands costs
 
   // Of world 0, which tells the others.
   std::string scene;  // file

@@ -107,6 +107,7 @@ DaemonSettings settings_of(const wire::Session& session, const Options& options)
   settings.dump_first = session.dump_first();
   settings.dump_last = session.dump_last();
   settings.pose_every = session.pose_every();
+  settings.measure = options.explain;
   return settings;
 }
 

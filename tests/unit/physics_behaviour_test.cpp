@@ -85,6 +85,7 @@ TEST(Rolling, ACylinderRollsDownAnInclineAtTwoThirdsOfG) {
   SceneBuilder builder("incline");
   builder.scene.sleeping = false;
   builder.scene.gravity = kG * Vec3(std::sin(0.2), 0, -std::cos(0.2));  // a level ground in tilted gravity
+  builder.scene.substeps = 4;
   builder.add(Cylinder{0.3, 0.8}, Vec3(0, 0, 0.3), rotation_of(Vec3(0.5 * 3.14159265358979, 0, 0)));
   builder.add_ground(200);
   World world(builder);
@@ -247,6 +248,7 @@ TEST(Contact, BodiesThatTipOverDoNotSinkIn) {
   for (const double degrees : {1.0, 2.0, 4.0, 6.0, 8.0, 9.5, 15.0, 30.0}) {
     SceneBuilder builder("tilt");
     builder.scene.sleeping = false;
+    builder.scene.substeps = 4;
     const double angle = degrees * 3.14159265358979 / 180;
     builder.add(Box{Vec3(1, 1, 1)}, Vec3(0, 0, 0.5 * (std::cos(angle) + std::sin(angle))),
                 rotation_of(Vec3(0, angle, 0)));

@@ -249,6 +249,104 @@ TEST(Joint, JointedBodiesCollideOnlyIfTheyShould) {
   }
 }
 
+// A chain of 20 links of 1 kg with something heavy at its end; tells how far its joints gape, at most.
+double gape_of_chain(double load, JointMethod method, std::uint32_t substeps) {
+  SceneBuilder builder = awake("chain");
+  builder.scene.joint_method = method;
+  builder.scene.substeps = substeps;
+  for (int i = 0; i < 20; ++i) {
+    builder.add(Capsule{0.03, 0.1}, Vec3(0, 0, -0.1 - 0.2 * i), Quat::Identity(), 1 / (4.0 / 3 * kPi * 2.7e-5 + kPi * 9e-5));
+    builder.add_joint(JointKind::kBall, i, i == 0 ? SceneBuilder::kWorld : i - 1, Vec3(0, 0, -0.2 * i));
+  }
+  builder.add(Box{Vec3(0.4, 0.4, 0.4)}, Vec3(0, 0, -4.2), Quat::Identity(), load / 0.064);
+  builder.add_joint(JointKind::kBall, 20, 19, Vec3(0, 0, -4));
+  World world(builder);
+  world.run(2);
+  double worst = 0;
+  for (std::size_t j = 0; j < world.model.scene().joints.size(); ++j) worst = std::max(worst, world.gap(j));
+  return worst;
+}
+
+TEST(Joint, AChainHoldsAnyLoadWithFewSubsteps) {
+  EXPECT_LT(gape_of_chain(1000, JointMethod::kChosen, 2), 1e-4);
+  EXPECT_LT(gape_of_chain(1000, JointMethod::kChosen, 0), 1e-4);
+  EXPECT_LT(gape_of_chain(1e6, JointMethod::kDirect, 2), 1e-4);
+  // One joint after the other it gives way: that is what being solved as a whole is for.
+  EXPECT_GT(gape_of_chain(1000, JointMethod::kIterated, 2), 0.02);
+}
+
+// Four bars in a ring, with hinges that say more than they need to: all of them keep the ring in its plane.
+TEST(Joint, AClosedRingOfHingesStaysClosed) {
+  SceneBuilder builder = awake("ring");
+  const Vec3 places[4] = {{0.5, 0, 0}, {1, 0, 0.5}, {0.5, 0, 1}, {0, 0, 0.5}};
+  for (int i = 0; i < 4; ++i) builder.add(i % 2 ? Box{Vec3(0.1, 0.1, 0.9)} : Box{Vec3(0.9, 0.1, 0.1)}, places[i]);
+  const Vec3 corners[4] = {{1, 0, 0}, {1, 0, 1}, {0, 0, 1}, {0, 0, 0}};
+  for (int i = 0; i < 4; ++i) builder.add_joint(JointKind::kHinge, i, (i + 1) % 4, corners[i], Vec3::UnitY());
+  builder.add_joint(JointKind::kHinge, 2, SceneBuilder::kWorld, Vec3(0.5, 0, 1), Vec3::UnitY());
+  builder.scene.bodies[0].linear_velocity = Vec3(2, 0, 0);
+  World world(builder);
+  double fastest = 0;
+  for (int i = 0; i < 300; ++i) {
+    world.stepper.step(world.set);
+    for (std::size_t j = 0; j < 5; ++j) EXPECT_LT(world.gap(j), 5e-3) << "step " << i << ", joint " << j;
+    for (const BodyState& body : world.set.bodies) fastest = std::max(fastest, body.v().norm());
+    for (const BodyState& body : world.set.bodies) EXPECT_LT(std::abs(body.position[1]), 1e-3);
+  }
+  EXPECT_GT(fastest, 1);  // it did swing
+  EXPECT_LT(fastest, 6);
+  EXPECT_EQ(world.stepper.shares.joints_alone, 0u);
+}
+
+TEST(Joint, AMeshOfTooManyJointsIsIterated) {
+  SceneBuilder builder = awake("cloth");
+  constexpr int kEdge = 24;
+  for (int i = 0; i < kEdge * kEdge; ++i) builder.add(Sphere{0.05}, Vec3(0.2 * (i % kEdge), 0, -0.2 * (i / kEdge)));
+  for (int i = 0; i < kEdge * kEdge; ++i) {
+    const Vec3 at(0.2 * (i % kEdge), 0, -0.2 * (i / kEdge));
+    if (i % kEdge + 1 < kEdge) builder.add_joint(JointKind::kBall, i, i + 1, at + Vec3(0.1, 0, 0));
+    if (i + kEdge < kEdge * kEdge) builder.add_joint(JointKind::kBall, i, i + kEdge, at - Vec3(0, 0, 0.1));
+  }
+  for (int i = 0; i < kEdge; ++i) builder.add_joint(JointKind::kBall, i, SceneBuilder::kWorld, Vec3(0.2 * i, 0, 0));
+  World world(builder);
+  world.run(1);
+  EXPECT_EQ(world.stepper.shares.joints_together, 0u);
+  EXPECT_GT(world.stepper.shares.joints_alone, 60u * world.model.scene().joints.size() / 2);
+  EXPECT_GT(world.at(kEdge * kEdge - 1).position[2], -0.2 * (kEdge - 1) - 0.3);  // hangs together
+}
+
+TEST(Joint, AUniversalJointBendsBothWaysAndPassesTurnsOn) {
+  // Two shafts in line along x, held up at their far ends by hinges; the second is bent by 20 degrees.
+  SceneBuilder builder = awake("cardan");
+  builder.scene.gravity = Vec3::Zero();
+  builder.add(Box{Vec3(0.8, 0.1, 0.1)}, Vec3(-0.5, 0, 0));
+  const Quat bend = rotation_of(Vec3(0, kPi / 9, 0));
+  builder.add(Box{Vec3(0.8, 0.1, 0.1)}, bend * Vec3(0.5, 0, 0), bend);
+  builder.add_joint(JointKind::kHinge, 0, SceneBuilder::kWorld, Vec3(-0.9, 0, 0), Vec3::UnitX()).motor =
+      JointMotor{3, 1e3};
+  builder.add_joint(JointKind::kHinge, 1, SceneBuilder::kWorld, bend * Vec3(0.9, 0, 0), bend * Vec3::UnitX());
+  // One yoke across the first shaft, the other across the second: both across each other.
+  Joint& joint = builder.add_joint(JointKind::kUniversal, 0, 1, Vec3::Zero(), Vec3::UnitX());
+  joint.frame_a = frame_in(builder.scene.bodies[0].pose, universal_frame(Vec3::Zero(), Vec3::UnitY(), Vec3::UnitZ()));
+  joint.frame_b = frame_in(builder.scene.bodies[1].pose,
+                           universal_frame(Vec3::Zero(), Vec3::UnitY(), bend * Vec3::UnitZ()));
+  World world(builder);
+  world.run(0.5);
+  double first = 0, second = 0, least = 1e9, most = 0;
+  for (int i = 0; i < 252; ++i) {  // two turns of 2.09 s
+    world.stepper.step(world.set);
+    first += std::abs(world.at(0).w().x()) / 60;
+    const double ratio = world.at(1).w().norm() / world.at(0).w().norm();
+    second += world.at(1).w().norm() / 60;
+    least = std::min(least, ratio);
+    most = std::max(most, ratio);
+    EXPECT_LT(world.gap(2), 1e-3);
+  }
+  EXPECT_NEAR(first, 4 * kPi, 0.05);
+  EXPECT_NEAR(second, first, 0.02);  // turn for turn ...
+  EXPECT_NEAR(least, std::cos(kPi / 9), 0.02);  // ... but uneven, by the cosine of the bend either way
+  EXPECT_NEAR(most, 1 / std::cos(kPi / 9), 0.02);
+}
+
 TEST(Joint, AHangingChainComesToRestSleepsAndIsWokenAsAWhole) {
   SceneBuilder builder("chain");
   for (int i = 0; i < 8; ++i) builder.add(Capsule{0.05, 0.1}, Vec3(0, 0, -0.1 - 0.2 * i));

@@ -47,6 +47,8 @@ Scene every_joint() {
   builder.add_joint(JointKind::kHinge, 5, SceneBuilder::kWorld, between(5), Vec3(0, 1, 0));
   builder.add_joint(JointKind::kFixed, 0, SceneBuilder::kWorld, Vec3(0, 0, 0));
   builder.add_joint(JointKind::kBall, 0, 1, between(0));
+  builder.add_joint(JointKind::kUniversal, 5, SceneBuilder::kWorld, between(5), Vec3(0.3, 0.2, -0.1)).name = "cardan";
+  builder.scene.joint_method = JointMethod::kDirect;
   return builder.finish();
 }
 
@@ -186,7 +188,7 @@ TEST(SceneJointsBuilder, FramesAreWhereTheyWereAskedFor) {
 
 TEST(SceneJointsBuilder, OrderAndRods) {
   const Scene scene = every_joint();
-  ASSERT_EQ(scene.joints.size(), 8u);
+  ASSERT_EQ(scene.joints.size(), 9u);
   for (const Joint& joint : scene.joints) EXPECT_TRUE(joint.b == kWorldBody || joint.a < joint.b);
   const Joint& slider = scene.joints[5];
   ASSERT_EQ(slider.kind, JointKind::kSlider);
@@ -197,6 +199,23 @@ TEST(SceneJointsBuilder, OrderAndRods) {
   EXPECT_EQ(rod.name, "rod");
   EXPECT_EQ(rod.limits->lower, 2);
   EXPECT_EQ(rod.limits->upper, 2);
+}
+
+TEST(SceneJointsBuilder, AUniversalJointTurnedRoundHoldsTheSame) {
+  Joint joint;
+  joint.kind = JointKind::kUniversal;
+  joint.a = 1, joint.b = 2;
+  joint.frame_a = universal_frame(Vec3(1, 2, 3), Vec3(1, 2, -2), Vec3(2, 1, 2));
+  joint.frame_b = universal_frame(Vec3(1, 2, 3), Vec3(-1, 0, 0), Vec3(0, 0.6, -0.8));
+  EXPECT_LT((joint.frame_a.orientation * Vec3::UnitX() - Vec3(1, 2, -2) / 3).norm(), 1e-14);
+  EXPECT_LT((joint.frame_a.orientation * Vec3::UnitY() - Vec3(2, 1, 2) / 3).norm(), 1e-14);
+  EXPECT_LT((joint.frame_b.orientation * Vec3::UnitY() - Vec3(0, 0.6, -0.8)).norm(), 1e-14);
+  const Joint before = joint;
+  turn_round(joint);
+  EXPECT_EQ(joint.a, 2u);
+  // What was a's x axis is b's y axis now, and the other way round.
+  EXPECT_LT((joint.frame_b.orientation * Vec3::UnitY() - before.frame_a.orientation * Vec3::UnitX()).norm(), 1e-14);
+  EXPECT_LT((joint.frame_a.orientation * Vec3::UnitX() - before.frame_b.orientation * Vec3::UnitY()).norm(), 1e-14);
 }
 
 TEST(SceneJointsBuilder, SliderWithoutLimitsIsRefused) {

@@ -198,6 +198,17 @@ TEST(SceneSdfJoints, WhatIsNotModelledIsListed) {
   EXPECT_EQ(import.mentions("<joint> between what does not move"), 1u);
 }
 
+TEST(SceneSdfJoints, UniversalTurnsAboutBothItsAxes) {
+  Import import;
+  const Joint one = import.one(joint("universal", axis("0 0 -2") + "<axis2><xyz>0.6 -0.8 0</xyz></axis2>"));
+  EXPECT_EQ(one.kind, JointKind::kUniversal);
+  // x of the parent's frame along the first axis, y of the child's along the second.
+  EXPECT_LT((one.frame_a.orientation * Vec3::UnitX() - Vec3(0, 0, -1)).norm(), 1e-12);
+  EXPECT_LT((one.frame_b.orientation * Vec3::UnitY() - Vec3(0.6, -0.8, 0)).norm(), 1e-12);
+  import.one(joint("universal", axis("1 0 0", limit("-1", "1")) + "<axis2><xyz>0 1 0</xyz></axis2>"));
+  EXPECT_EQ(import.mentions("limits of a universal <joint>"), 1u);
+}
+
 struct BadSdfJoint {
   const char* name;
   std::string text;
@@ -220,8 +231,9 @@ TEST_P(SceneBadSdfJoint, IsRefused) {
 INSTANTIATE_TEST_SUITE_P(
     Scene, SceneBadSdfJoint,
     ::testing::Values(
-        BadSdfJoint{"Universal", model(joint("universal", axis("1 0 0") + "<axis2><xyz>0 1 0</xyz></axis2>")),
-                    "joint \"m::j\": type: \"universal\" is not simulated"},
+        BadSdfJoint{"UniversalWithOneAxis", model(joint("universal", axis("1 0 0"))), "joint \"m::j\": axis2"},
+        BadSdfJoint{"UniversalWithParallelAxes",
+                    model(joint("universal", axis("1 0 0") + "<axis2><xyz>1 0.1 0</xyz></axis2>")), "across"},
         BadSdfJoint{"Screw", model(joint("screw", axis("1 0 0"))), "\"screw\" is not simulated"},
         BadSdfJoint{"Gearbox", model(joint("gearbox", axis("1 0 0") + "<axis2><xyz>0 1 0</xyz></axis2>")),
                     "\"gearbox\" is not simulated"},

@@ -100,6 +100,7 @@ inline void expect_same_bits(const Scene& a, const Scene& b) {
   EXPECT_TRUE(same_bits(a.dt, b.dt) && same_bits(a.max_speed, b.max_speed) &&
               same_bits(a.territory_cell, b.territory_cell));
   EXPECT_EQ(a.substeps, b.substeps);
+  EXPECT_EQ(a.joint_method, b.joint_method);
   EXPECT_EQ(a.sleeping, b.sleeping);
   ASSERT_EQ(a.geometries.size(), b.geometries.size());
   for (std::size_t g = 0; g < a.geometries.size(); ++g) EXPECT_EQ(a.geometries[g].index(), b.geometries[g].index());

@@ -1,0 +1,55 @@
+#include "client/cli/explanation.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+namespace soda::cli {
+
+void print_explanation(const Collector& collector) {
+  if (!collector.session()) return;
+  const double steps = static_cast<double>(std::max<Step>(1, collector.whole_steps() - 1));
+  wire::Status sum;
+  double seconds = 0;
+  for (const wire::Status& s : collector.worlds()) {
+    for (std::size_t k = 0; k < s.shares().size(); ++k) {
+      sum.shares()[k].islands() += s.shares()[k].islands();
+      sum.shares()[k].bodies() += s.shares()[k].bodies();
+      sum.shares()[k].contacts() += s.shares()[k].contacts();
+      sum.shares()[k].seconds() += s.shares()[k].seconds();
+      seconds += s.shares()[k].seconds();
+    }
+    sum.joints_together() += s.joints_together(), sum.joints_alone() += s.joints_alone();
+    sum.turning_flights() += s.turning_flights(), sum.bouncing() += s.bouncing();
+  }
+  std::string text = "\nHow the scene was modelled, per step (what was done again counts again; sleeping bodies do not):\n";
+  text += fmt::format("  {:<34}{:>10}{:>10}{:>10}{:>12}{:>8}\n", "", "islands", "bodies", "contacts", "CPU us", "share");
+  std::uint64_t islands = 0;
+  for (std::size_t k = 0; k < sum.shares().size(); ++k) {
+    const wire::ModelShare& share = sum.shares()[k];
+    if (share.islands() == 0) continue;
+    islands += share.islands();
+    const std::string name = k == 0   ? "touching nothing: exact flight"
+                             : k == 1 ? "solved in 1 sub-step"
+                                      : fmt::format("solved in {} sub-steps", 1u << (k - 1));
+    text += fmt::format("  {:<34}{:>10.1f}{:>10.1f}{:>10.1f}{:>12.1f}{:>7.1f}%\n", name,
+                        static_cast<double>(share.islands()) / steps, static_cast<double>(share.bodies()) / steps,
+                        static_cast<double>(share.contacts()) / steps, 1e6 * share.seconds() / steps,
+                        seconds > 0 ? 100 * share.seconds() / seconds : 0.0);
+  }
+  if (islands == 0) text += "  nothing moved\n";
+  const auto line = [&](const char* what, std::uint64_t count) {
+    if (count > 0) text += fmt::format("  {:<34}{:>10.1f}\n", what, static_cast<double>(count) / steps);
+  };
+  line("flights with gyroscopic terms", sum.turning_flights());
+  line("contacts that bounce", sum.bouncing());
+  line("joints solved as a whole", sum.joints_together());
+  line("joints solved one by one", sum.joints_alone());
+  text += "Sub-steps are chosen for each island by its state, unless the scene fixes them: model { substeps: 4 }.\n";
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+}  // namespace soda::cli

@@ -1,0 +1,11 @@
+// What `soda run --explain` tells: how the bodies of a run were modelled, how many, and what that cost.
+#pragma once
+
+#include "client/cli/collector.h"
+
+namespace soda::cli {
+
+// To standard output, as a table; sums over all worlds, per step of the run. Says so where nothing was heard.
+void print_explanation(const Collector& collector);
+
+}  // namespace soda::cli
