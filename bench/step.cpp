@@ -1,5 +1,6 @@
 // soda-bench step: one step of ours against one of stock Bullet, in the same run on the same scenes, and what saving,
 // restoring and hashing its state cost.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -60,48 +61,95 @@ Standing standing(const Scene& scene, const SceneCase& c, const std::function<Ve
   return result;
 }
 
-struct Block {
-  std::vector<double> ours, bullet;  // ms per step, by round
+// How far touching bodies stand in each other, as a share of the smaller's smallest half extent: what resting contacts
+// are wrong by. Found anew from the poses alone, the same way for all sides.
+struct Overlap {
+  double most = 0, one_in_a_hundred = 0;  // the largest, and what a hundredth of the contacts is beyond
 };
 
+Overlap overlap(const physics::Model& model, std::span<const BodyState> bodies) {
+  BodySet set;
+  set.bodies.assign(bodies.begin(), bodies.end());
+  std::vector<ContactRecord> contacts;
+  physics::Stepper(model).find_contacts(set, {}, contacts);
+  std::vector<double> depths;
+  for (const ContactRecord& r : contacts) {
+    if (r.with_static()) continue;
+    const Vec3 normal(r.normal[0], r.normal[1], r.normal[2]), offset(r.offset[0], r.offset[1], r.offset[2]);
+    double depth = 0;
+    for (std::uint32_t k = 0; k < r.count; ++k) {
+      const double *a = r.points[k].arm_a, *b = r.points[k].arm_b;
+      depth = std::max(depth, -normal.dot(offset + Vec3(b[0] - a[0], b[1] - a[1], b[2] - a[2])));
+    }
+    depths.push_back(depth / std::min(model.find(r.a)->inner_extent, model.find(r.b)->inner_extent));
+  }
+  if (depths.empty()) return {};
+  std::sort(depths.begin(), depths.end());
+  return {depths.back(), depths[depths.size() * 99 / 100]};
+}
+
+// Ours with four sub-steps throughout, ours with what each island needs, and stock Bullet.
+enum Side { kFour, kChosen, kBullet, kSides };
+
 struct Measured {
-  std::vector<Block> blocks;
-  physics::StageTimes stages;  // ms per step, mean over all rounds
-  Standing ours, bullet;
+  std::vector<std::vector<double>> blocks[kSides];  // ms per step, by block, then round
+  physics::StageTimes stages;                       // of kFour: ms per step, mean over all rounds
+  Standing standing[kSides];
+  Overlap overlap[kSides];
   double contacts = 0;  // records at the end
 };
 
-void measure_round(const Scene& scene, const SceneCase& c, int blocks, bool ours_first, int rounds, Measured& m,
+class Ours {
+ public:
+  Ours(Scene scene, std::uint32_t substeps) : model_(fixed(std::move(scene), substeps)), stepper_(model_) {
+    stepper_.timing = true;
+    set = model_.initial_state();
+  }
+  void step() { stepper_.step(set); }
+  const physics::StageTimes& times() const { return stepper_.times; }
+  BodySet set;
+
+ private:
+  static Scene fixed(Scene scene, std::uint32_t substeps) {
+    scene.substeps = substeps;
+    return scene;
+  }
+  physics::Model model_;
+  physics::Stepper stepper_;
+};
+
+void measure_round(const Scene& scene, const SceneCase& c, int blocks, int round, int rounds, Measured& m,
                    BodySet& last) {
-  const physics::Model model(scene);
-  physics::Stepper stepper(model);
-  stepper.timing = true;
-  BodySet set = model.initial_state();
+  Ours four(scene, 4), chosen(scene, 0);
   BulletWorld bullet(scene);
-  const auto block = [&](auto&& step) {
-    const double start = cpu_seconds();
-    for (int i = 0; i < kBlock; ++i) step();
-    return 1e3 * (cpu_seconds() - start) / kBlock;
-  };
-  m.blocks.resize(blocks);
+  const std::function<void()> steps[kSides] = {[&] { four.step(); }, [&] { chosen.step(); }, [&] { bullet.step(); }};
+  for (int side = 0; side < kSides; ++side) m.blocks[side].resize(blocks);
   for (int b = 0; b < blocks; ++b)
-    for (int turn = 0; turn < 2; ++turn) {
-      if ((turn == 0) == ours_first)
-        m.blocks[b].ours.push_back(block([&] { stepper.step(set); }));
-      else
-        m.blocks[b].bullet.push_back(block([&] { bullet.step(); }));
+    for (int turn = 0; turn < kSides; ++turn) {
+      const int side = (turn + round) % kSides;
+      const double start = cpu_seconds();
+      for (int i = 0; i < kBlock; ++i) steps[side]();
+      m.blocks[side][b].push_back(1e3 * (cpu_seconds() - start) / kBlock);
     }
   const double scale = 1e3 / (kBlock * blocks * rounds);
-  m.stages.boxes += scale * stepper.times.boxes;
-  m.stages.broad += scale * stepper.times.broad;
-  m.stages.narrow += scale * stepper.times.narrow;
-  m.stages.islands += scale * stepper.times.islands;
-  m.stages.order += scale * stepper.times.order;
-  m.stages.solve += scale * stepper.times.solve;
-  m.ours = standing(scene, c, [&](std::size_t i) { return set.bodies[i].x(); });
-  m.bullet = standing(scene, c, [&](std::size_t i) { return bullet.position(i); });
-  m.contacts = static_cast<double>(set.contacts.size());
-  last = std::move(set);
+  const auto& times = four.times();
+  m.stages.boxes += scale * times.boxes;
+  m.stages.broad += scale * times.broad;
+  m.stages.narrow += scale * times.narrow;
+  m.stages.islands += scale * times.islands;
+  m.stages.order += scale * times.order;
+  m.stages.solve += scale * times.solve;
+  m.standing[kFour] = standing(scene, c, [&](std::size_t i) { return four.set.bodies[i].x(); });
+  m.standing[kChosen] = standing(scene, c, [&](std::size_t i) { return chosen.set.bodies[i].x(); });
+  m.standing[kBullet] = standing(scene, c, [&](std::size_t i) { return bullet.position(i); });
+  const physics::Model model(scene);
+  std::vector<BodyState> of_bullet;
+  bullet.read(of_bullet);
+  m.overlap[kFour] = overlap(model, four.set.bodies);
+  m.overlap[kChosen] = overlap(model, chosen.set.bodies);
+  m.overlap[kBullet] = overlap(model, of_bullet);
+  m.contacts = static_cast<double>(four.set.contacts.size());
+  last = std::move(four.set);
 }
 
 // What it costs to keep, bring back and compare a state, per body.
@@ -145,22 +193,23 @@ void measure_state(const std::string& name, const physics::Model& model, const B
 
 constexpr const char* kBars = R"(
 set style fill solid 0.9 border -1
-set boxwidth 0.35
+set boxwidth 0.24
 set ylabel 'CPU time per step (ms)'
 set yrange [0:*]
 set xrange [-0.6:3.6]
 set grid y
 set key top left
 set bmargin 3.5
-set title 'One step of SODA (by stage) and of stock Bullet in double precision, sleeping off'
-# columns: scene, bodies, bullet, ours, boxes, broad, narrow, islands, order, solve
+set title 'One step of SODA (4 sub-steps, by stage; and as needed) and of stock Bullet in double precision, sleeping off'
+# columns: scene, bodies, bullet, ours, chosen, boxes, broad, narrow, islands, order, solve
 plot 'step.csv' skip 1 using ($0-0.19):3 with boxes lc rgb '#b0b0b0' title 'stock Bullet', \
-  '' skip 1 using ($0+0.19):($5+$6+$7+$8+$9+$10) with boxes lc rgb '#d1603d' title 'solve', \
-  '' skip 1 using ($0+0.19):($5+$6+$7+$8+$9) with boxes lc rgb '#e9b44c' title 'order', \
-  '' skip 1 using ($0+0.19):($5+$6+$7+$8) with boxes lc rgb '#8e6c8a' title 'islands', \
-  '' skip 1 using ($0+0.19):($5+$6+$7) with boxes lc rgb '#3d7ea6' title 'narrow phase', \
-  '' skip 1 using ($0+0.19):($5+$6) with boxes lc rgb '#6a994e' title 'broad phase', \
-  '' skip 1 using ($0+0.19):5 with boxes lc rgb '#5c9ead' title 'boxes', \
+  '' skip 1 using ($0+0.06):($6+$7+$8+$9+$10+$11) with boxes lc rgb '#d1603d' title 'solve', \
+  '' skip 1 using ($0+0.06):($6+$7+$8+$9+$10) with boxes lc rgb '#e9b44c' title 'order', \
+  '' skip 1 using ($0+0.06):($6+$7+$8+$9) with boxes lc rgb '#8e6c8a' title 'islands', \
+  '' skip 1 using ($0+0.06):($6+$7+$8) with boxes lc rgb '#3d7ea6' title 'narrow phase', \
+  '' skip 1 using ($0+0.06):($6+$7) with boxes lc rgb '#6a994e' title 'broad phase', \
+  '' skip 1 using ($0+0.06):6 with boxes lc rgb '#5c9ead' title 'boxes', \
+  '' skip 1 using ($0+0.31):5 with boxes lc rgb '#606060' title 'sub-steps as needed', \
   '' skip 1 using 0:(0):xtic(sprintf("%s\n%d bodies", stringcolumn(1), column(2))) with points pt 0 notitle
 )";
 
@@ -175,7 +224,10 @@ do for [scene in 'piles heap towers city'] {
   set title scene
   plot 'step_course.csv' skip 1 using 2:(stringcolumn(1) eq scene ? $4 : NaN) with linespoints pt 7 ps .5 lc rgb '#909090' \
       title 'stock Bullet', \
-    '' skip 1 using 2:(stringcolumn(1) eq scene ? $3 : NaN) with linespoints pt 7 ps .5 lc rgb '#d1603d' title 'SODA'
+    '' skip 1 using 2:(stringcolumn(1) eq scene ? $3 : NaN) with linespoints pt 7 ps .5 lc rgb '#d1603d' \
+      title 'SODA, 4 sub-steps', \
+    '' skip 1 using 2:(stringcolumn(1) eq scene ? $5 : NaN) with linespoints pt 7 ps .5 lc rgb '#3d7ea6' \
+      title 'SODA, as needed'
 }
 unset multiplot
 )";
@@ -185,9 +237,11 @@ unset multiplot
 void step(const Options& options, Headline& headline) {
   const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 3;
   Csv table(options, "step",
-            "scene,bodies,bullet_ms,soda_ms,boxes_ms,broad_ms,narrow_ms,islands_ms,order_ms,solve_ms,"
-            "stacks,standing,standing_bullet,drift_m,drift_bullet_m,sink_m,sink_bullet_m");
-  Csv course(options, "step_course", "scene,seconds,soda_ms,bullet_ms");
+            "scene,bodies,bullet_ms,soda_ms,chosen_ms,boxes_ms,broad_ms,narrow_ms,islands_ms,order_ms,solve_ms,"
+            "stacks,standing,standing_chosen,standing_bullet,drift_m,drift_chosen_m,drift_bullet_m,sink_m,"
+            "sink_chosen_m,sink_bullet_m,overlap,overlap_chosen,overlap_bullet");
+  Csv course(options, "step_course", "scene,seconds,soda_ms,bullet_ms,chosen_ms");
+  const char* const side_names[kSides] = {"", "_chosen", "_bullet"};
   for (SceneCase c : kScenes) {
     if (options.quick) c.bodies /= 4, c.stacked /= 4;
     Scene scene = generate(c.name, c.bodies, kSeed);
@@ -195,28 +249,34 @@ void step(const Options& options, Headline& headline) {
     const int blocks = static_cast<int>(std::lround((options.quick ? 2 : kSeconds) / scene.dt)) / kBlock;
     Measured m;
     BodySet last;
-    for (int round = 0; round < rounds; ++round) measure_round(scene, c, blocks, round % 2 == 0, rounds, m, last);
-    // Both runs are deterministic, so a block does the same work in every round.
-    double ours = 0, bullet = 0;
+    for (int round = 0; round < rounds; ++round) measure_round(scene, c, blocks, round, rounds, m, last);
+    // All runs are deterministic, so a block does the same work in every round.
+    double ms[kSides] = {};
     for (int b = 0; b < blocks; ++b) {
-      const double o = median(m.blocks[b].ours), s = median(m.blocks[b].bullet);
-      ours += o / blocks;
-      bullet += s / blocks;
-      course.row(c.name, (b + 0.5) * kBlock * scene.dt, o, s);
+      double here[kSides];
+      for (int side = 0; side < kSides; ++side) ms[side] += (here[side] = median(m.blocks[side][b])) / blocks;
+      course.row(c.name, (b + 0.5) * kBlock * scene.dt, here[kFour], here[kBullet], here[kChosen]);
     }
     const std::uint32_t stacks = c.stacked / c.per_stack;
-    std::printf("%-7s %5u bodies: SODA %.3f ms per step, stock Bullet %.3f, ratio %.3f", c.name, c.bodies, ours, bullet,
-                ours / bullet);
-    if (stacks) std::printf("; of %u stacks %u stand, with Bullet %u", stacks, m.ours.stacks, m.bullet.stacks);
-    std::printf("\n");
+    std::printf(
+        "%-7s %5u bodies: SODA %.3f ms per step (sub-steps as needed: %.3f), stock Bullet %.3f, ratio %.3f (%.3f)",
+        c.name, c.bodies, ms[kFour], ms[kChosen], ms[kBullet], ms[kFour] / ms[kBullet], ms[kChosen] / ms[kBullet]);
+    if (stacks)
+      std::printf("; of %u stacks %u (%u) stand, with Bullet %u", stacks, m.standing[kFour].stacks,
+                  m.standing[kChosen].stacks, m.standing[kBullet].stacks);
+    std::printf("; overlap of one contact in a hundred, of half extents: %.3f (%.3f), Bullet %.3f\n",
+                m.overlap[kFour].one_in_a_hundred, m.overlap[kChosen].one_in_a_hundred,
+                m.overlap[kBullet].one_in_a_hundred);
     std::fflush(stdout);
-    table.row(c.name, c.bodies, bullet, ours, m.stages.boxes, m.stages.broad, m.stages.narrow, m.stages.islands,
-              m.stages.order, m.stages.solve, stacks, m.ours.stacks, m.bullet.stacks, m.ours.drift, m.bullet.drift,
-              m.ours.sink, m.bullet.sink);
+    const auto& [four, chosen, bullet] = m.standing;
+    table.row(c.name, c.bodies, ms[kBullet], ms[kFour], ms[kChosen], m.stages.boxes, m.stages.broad, m.stages.narrow,
+              m.stages.islands, m.stages.order, m.stages.solve, stacks, four.stacks, chosen.stacks, bullet.stacks,
+              four.drift, chosen.drift, bullet.drift, four.sink, chosen.sink, bullet.sink,
+              m.overlap[kFour].one_in_a_hundred, m.overlap[kChosen].one_in_a_hundred,
+              m.overlap[kBullet].one_in_a_hundred);
     const std::string name = c.name;
-    headline.add(name + ".time_over_bullet", ours / bullet);
-    headline.add(name + ".ms_per_step", ours);
-    headline.add(name + ".ms_per_step_bullet", bullet);
+    headline.add(name + ".time_over_bullet", ms[kFour] / ms[kBullet]);
+    headline.add(name + ".time_over_bullet_chosen", ms[kChosen] / ms[kBullet]);
     headline.add(name + ".boxes_ms", m.stages.boxes);
     headline.add(name + ".broad_ms", m.stages.broad);
     headline.add(name + ".narrow_ms", m.stages.narrow);
@@ -224,14 +284,16 @@ void step(const Options& options, Headline& headline) {
     headline.add(name + ".order_ms", m.stages.order);
     headline.add(name + ".solve_ms", m.stages.solve);
     headline.add(name + ".contact_records", m.contacts);
-    if (stacks) {
-      headline.add(name + ".stacks", stacks);
-      headline.add(name + ".standing", m.ours.stacks);
-      headline.add(name + ".standing_bullet", m.bullet.stacks);
-      headline.add(name + ".drift_m", m.ours.drift);
-      headline.add(name + ".drift_bullet_m", m.bullet.drift);
-      headline.add(name + ".sink_m", m.ours.sink);
-      headline.add(name + ".sink_bullet_m", m.bullet.sink);
+    if (stacks) headline.add(name + ".stacks", stacks);
+    for (int side = 0; side < kSides; ++side) {
+      const std::string of = side_names[side];
+      headline.add(name + ".ms_per_step" + of, ms[side]);
+      headline.add(name + ".overlap" + of, m.overlap[side].one_in_a_hundred);
+      headline.add(name + ".overlap_most" + of, m.overlap[side].most);
+      if (!stacks) continue;
+      headline.add(name + ".standing" + of, m.standing[side].stacks);
+      headline.add(name + ".drift" + of + "_m", m.standing[side].drift);
+      headline.add(name + ".sink" + of + "_m", m.standing[side].sink);
     }
     measure_state(name, physics::Model(scene), last, headline);
   }

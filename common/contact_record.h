@@ -35,9 +35,9 @@ struct ContactRecord {
   bool with_static() const { return (b & kStaticBit) != 0; }
 };
 
-// ---- records of joints: `part` is this and the joint's number among those of the two bodies. One point holds impulses,
-// at the rate of the last sub-step: arm_a the linear one on b, N s, arm_b the angular one, N m s, both in world axes; `impulse`,
-// `friction` and `twist` those of limits, motor and spring. Without normal and anchors.
+// ---- records of joints: `part` is this and the joint's number among those of the two bodies. One point holds
+// impulses, at the rate of the last sub-step: arm_a the linear one on b, N s, arm_b the angular one, N m s, both in
+// world axes; `impulse`, `friction` and `twist` those of limits, motor and spring. Without normal and anchors.
 constexpr std::uint32_t kJointPart = 0xffffff00u;
 inline bool is_joint(const ContactRecord& record) { return record.part >= kJointPart; }
 

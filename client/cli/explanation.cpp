@@ -24,8 +24,10 @@ void print_explanation(const Collector& collector) {
     sum.joints_together() += s.joints_together(), sum.joints_alone() += s.joints_alone();
     sum.turning_flights() += s.turning_flights(), sum.bouncing() += s.bouncing();
   }
-  std::string text = "\nHow the scene was modelled, per step (what was done again counts again; sleeping bodies do not):\n";
-  text += fmt::format("  {:<34}{:>10}{:>10}{:>10}{:>12}{:>8}\n", "", "islands", "bodies", "contacts", "CPU us", "share");
+  std::string text =
+      "\nHow the scene was modelled, per step (what was done again counts again; sleeping bodies do not):\n";
+  text +=
+      fmt::format("  {:<34}{:>10}{:>10}{:>10}{:>12}{:>8}\n", "", "islands", "bodies", "contacts", "CPU us", "share");
   std::uint64_t islands = 0;
   for (std::size_t k = 0; k < sum.shares().size(); ++k) {
     const wire::ModelShare& share = sum.shares()[k];

@@ -3,9 +3,9 @@
 #include <tinyxml2.h>
 
 #include <cmath>
-#include <numbers>
 #include <cstdlib>
 #include <ignition/math/Pose3.hh>
+#include <numbers>
 
 #include "common/import/warnings.h"
 #include "common/scene/random.h"

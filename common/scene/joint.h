@@ -14,11 +14,11 @@ namespace soda {
 struct Scene;
 
 enum class JointKind : std::uint8_t {
-  kFixed,     // frames stay one
-  kBall,      // origins stay one
-  kHinge,     // origins and z axes stay one
-  kSlider,    // axes stay parallel, b's origin on a's x axis
-  kDistance,  // origins stay within limits of each other
+  kFixed,      // frames stay one
+  kBall,       // origins stay one
+  kHinge,      // origins and z axes stay one
+  kSlider,     // axes stay parallel, b's origin on a's x axis
+  kDistance,   // origins stay within limits of each other
   kUniversal,  // origins stay one, a's x axis stays across b's y axis
 };
 
@@ -67,8 +67,8 @@ void turn_round(Joint& joint);
 // scenes; the bodies are there already, ascending by id. What cannot be put right is left for the checks.
 void order_ends(const Scene& scene, Joint& joint);
 
-// How far each end looks for the other, m, beyond what the joint's limits allow: worlds look for a joint's other body no
-// further away. A joint that is torn further than both ends look does nothing until its bodies are near again.
+// How far each end looks for the other, m, beyond what the joint's limits allow: worlds look for a joint's other body
+// no further away. A joint that is torn further than both ends look does nothing until its bodies are near again.
 double joint_slack(const Scene& scene, const Joint& joint);
 
 // Of each end: the sphere about its place, radius in m, within which the other end's place is looked for.

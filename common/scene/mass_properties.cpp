@@ -1,8 +1,8 @@
 #include "common/scene/mass_properties.h"
 
 #include <Eigen/Eigenvalues>
-#include <stdexcept>
 #include <numbers>
+#include <stdexcept>
 
 #include "common/scene/convex_hull.h"
 

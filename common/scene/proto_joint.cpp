@@ -62,7 +62,8 @@ void read_kind(const pb::Joint& message, Joint& joint) {
     case pb::Joint::KIND_NOT_SET:
       break;
   }
-  throw FieldError("", "is of no kind that this version of SODA knows (fixed, ball, hinge, slider, distance, universal)");
+  throw FieldError("",
+                   "is of no kind that this version of SODA knows (fixed, ball, hinge, slider, distance, universal)");
 }
 
 // None for the world.

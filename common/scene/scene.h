@@ -114,9 +114,9 @@ struct Scene {
   double dt = 1.0 / 60;              // s, one step
   std::uint32_t substeps = 0;        // solver sub-steps per step; 0: chosen for each island by its state
   JointMethod joint_method = JointMethod::kChosen;
-  bool sleeping = true;              // whether quiet islands may sleep
-  double max_speed = 100;            // m/s; faster bodies are clamped, counted and reported
-  double territory_cell = 0;         // m, edge of a territory cell; 0: chosen from the bodies (grid.h)
+  bool sleeping = true;       // whether quiet islands may sleep
+  double max_speed = 100;     // m/s; faster bodies are clamped, counted and reported
+  double territory_cell = 0;  // m, edge of a territory cell; 0: chosen from the bodies (grid.h)
   std::vector<Geometry> geometries;
   std::vector<Body> bodies;   // ascending by id
   std::vector<Joint> joints;  // ascending by a, then b; no joint names a body that is not there

@@ -48,10 +48,10 @@ constexpr double kMaxAcceleration = 1e6;                 // m/s^2, of gravity an
 constexpr double kMinStep = 1e-6, kMaxStep = 1;          // s, of Scene::dt
 constexpr unsigned kMaxSubsteps = 64;
 constexpr double kMaxFriction = 100;
-constexpr double kMaxDamping = 1e4;                   // 1/s
+constexpr double kMaxDamping = 1e4;             // 1/s
 constexpr double kMaxAngle = std::numbers::pi;  // rad, of limits of hinges and twists
-constexpr double kMaxEffort = 1e18;                   // N, N m
-constexpr double kMaxFrequency = 1e4;                 // Hz, of springs
+constexpr double kMaxEffort = 1e18;             // N, N m
+constexpr double kMaxFrequency = 1e4;           // Hz, of springs
 constexpr double kMaxDampingRatio = 100;
 constexpr std::size_t kMaxJointsOfPair = 255;
 constexpr std::size_t kMaxNameLength = 1000;  // bytes

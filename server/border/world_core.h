@@ -133,13 +133,13 @@ class WorldCore {
   const std::vector<WorldId>& neighbours() const;
   // Neighbours whose messages the next piece of work lacks, or may lack: those first who are behind.
   std::vector<WorldId> waiting_for() const;
-  std::string why_not_final() const;         // what the next final step lacks, in words, for logs
+  std::string why_not_final() const;  // what the next final step lacks, in words, for logs
   // ---- for those who watch: what this world produced at a step from oldest() to clock(), final or not
   Step oldest() const;
   const Table<timeline::Record>& states(Step step) const;
   bool touches_foreign(Step step, timeline::Slot slot) const;
 
-  std::size_t own_bodies() const;            // bodies whose centre lies in the territory at the clock
+  std::size_t own_bodies() const;  // bodies whose centre lies in the territory at the clock
   std::size_t own_cells() const;
   const CoreStats& stats() const;
 

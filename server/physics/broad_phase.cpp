@@ -126,8 +126,7 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
       const Entry& entry = entries_[e];
       scan(entry, entry.x, entry.x, entry.y, entry.z, e + 1, none);
       scan(entry, entry.x + 1, entry.x + 1, entry.y, entry.z, 0, none);
-      for (const auto& row : kRows)
-        scan(entry, entry.x - 1, entry.x + 1, entry.y + row[0], entry.z + row[1], 0, none);
+      for (const auto& row : kRows) scan(entry, entry.x - 1, entry.x + 1, entry.y + row[0], entry.z + row[1], 0, none);
     }
   }
   for (std::uint32_t l : large_)

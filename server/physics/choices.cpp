@@ -56,8 +56,8 @@ std::uint32_t Chooser::depth_from_ground(const IslandView& island) {
 }
 
 // Contacts are springs: one of frequency f on which d bodies rest, each r times as heavy as the one that carries them,
-// gives by g r d / (2 pi f)^2. That is to be a small share of the body's size; and an island is to be no deeper than the
-// square of the sub-steps, for what one pass takes to run through it.
+// gives by g r d / (2 pi f)^2. That is to be a small share of the body's size; and an island is to be no deeper than
+// the square of the sub-steps, for what one pass takes to run through it.
 double Chooser::stiffness_wanted(const IslandView& island) {
   const double gravity = constants_.gravity.norm();
   if (!(gravity > 0)) return 0;

@@ -14,9 +14,9 @@ struct StepConstants {
   explicit StepConstants(const Scene& scene);
   double dt;               // s
   std::uint32_t substeps;  // 0: chosen for each island
-  Vec3 gravity;      // m/s^2
-  Vec3 up;           // unit, against gravity; zero without gravity
-  double max_speed;  // m/s
+  Vec3 gravity;            // m/s^2
+  Vec3 up;                 // unit, against gravity; zero without gravity
+  double max_speed;        // m/s
   bool sleeping;
   std::uint32_t quiet_steps_to_sleep;
 };

@@ -1,7 +1,8 @@
-// Joints in the island solver. What joints hold is solved as a whole for all joints that hang together by bodies: chains
-// and trees directly, so that a heavy load on a chain of light links costs no more than a light one. Limits, motors and
-// springs are rows of their own, solved one after the other. Where the bodies are now is looked at before each pass, so
-// that a joint turns with them within the step. Scalar code: the same bits whatever the contacts' kernel is.
+// Joints in the island solver. What joints hold is solved as a whole for all joints that hang together by bodies:
+// chains and trees directly, so that a heavy load on a chain of light links costs no more than a light one. Limits,
+// motors and springs are rows of their own, solved one after the other. Where the bodies are now is looked at before
+// each pass, so that a joint turns with them within the step. Scalar code: the same bits whatever the contacts' kernel
+// is.
 #pragma once
 
 #include <array>
@@ -51,7 +52,7 @@ class JointSolver {
     bool used[kExtras];
     Line along[kExtras];
     double extra_mass[kExtras], extra_error[kExtras];
-    double linear_mass;  // 1/kg: sum of both inverse masses
+    double linear_mass;       // 1/kg: sum of both inverse masses
     std::uint32_t first_row;  // of matrix_
     bool joins;               // may be solved together with others
   };

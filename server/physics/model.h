@@ -31,7 +31,7 @@ struct BodyModel {
   std::uint32_t first_child = 0, children = 0;     // range in ShapeStore::children
   double radius = 0;                               // m, of the sphere about the centre of mass that holds all shapes
   double reach = 0;                                // m, likewise, with what its joints reach for
-  double inner_extent = 0;  // m, smallest half extent of any child: the scale for recycling contacts
+  double inner_extent = 0;          // m, smallest half extent of any child: the scale for recycling contacts
   double inverse_inner_extent = 0;  // 1/m
   bool is_ball = false;             // a sphere about its centre of mass, which looks the same however it turns
   const Drive* drive = nullptr;

@@ -20,7 +20,7 @@ class Skyline {
   std::uint32_t size() const { return static_cast<std::uint32_t>(rows_.size()); }
   // How many operations factoring the rows from `begin` on takes, roughly.
   std::size_t work(std::uint32_t begin) const;
-  void cut(std::uint32_t size);  // takes all rows after the first `size` away
+  void cut(std::uint32_t size);                       // takes all rows after the first `size` away
   void zero(std::uint32_t begin, std::uint32_t end);  // all entries of these rows
   // Entry (row, column), with first <= column <= row.
   double& at(std::uint32_t row, std::uint32_t column) {

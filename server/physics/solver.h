@@ -24,7 +24,7 @@ struct Surface {
   // How much of the place of contact's motion against the bodies is against a: nothing of round bodies, which roll on
   // under it, and all of what they roll on.
   double moves_on_a = 0.5;
-  std::uint32_t stiffness = 0;  // see Choice
+  std::uint32_t stiffness = 0;         // see Choice
   const StaticModel* fixed = nullptr;  // b, where it is static
   const JointModel* joint = nullptr;   // or, instead of all of these, the joint that the record is of
 };
@@ -41,10 +41,10 @@ class IslandSolver {
   // Another kernel than the machine's best, for comparisons.
   void use(const Kernel& kernel) { kernel_ = &kernel; }
 
-  // Advances the bodies of some awake islands by one step of `substeps` sub-steps. `contacts` are positions in `records` (with `ends` and
-  // `surfaces` alongside), each island's in its solving order; between islands, which share no moving body, any order
-  // gives the same bits, and mixing them fills the lanes. `slot_of` maps a body's position in `ends` to its position in
-  // `bodies`. Impulses are written back into `records`.
+  // Advances the bodies of some awake islands by one step of `substeps` sub-steps. `contacts` are positions in
+  // `records` (with `ends` and `surfaces` alongside), each island's in its solving order; between islands, which share
+  // no moving body, any order gives the same bits, and mixing them fills the lanes. `slot_of` maps a body's position in
+  // `ends` to its position in `bodies`. Impulses are written back into `records`.
   void solve(std::uint32_t substeps, std::span<MovingBody> bodies, std::span<const std::uint32_t> slot_of,
              std::span<const std::uint32_t> contacts, std::span<const Ends> ends, std::span<const Surface> surfaces,
              std::span<ContactRecord> records);
@@ -61,7 +61,7 @@ class IslandSolver {
 
   const StepConstants& constants_;
   std::uint32_t substeps_ = 0;
-  double h_ = 0;                                // s, one sub-step
+  double h_ = 0;                                  // s, one sub-step
   Softness soft_[kMostSubstepLevel + 1][2] = {};  // by stiffness, and whether against a static body
   const Kernel* kernel_ = &chosen_kernel();
   JointSolver joints_;

@@ -32,16 +32,16 @@ Aabb reach_box(const BodyState& state, const Model& scene);
 // What was solved in one way, over all steps.
 struct ModelShare {
   std::uint64_t islands = 0, bodies = 0, contacts = 0;  // contacts: records, those of joints included
-  double seconds = 0;  // CPU; only kept when timing is on
+  double seconds = 0;                                   // CPU; only kept when timing is on
 };
 
 // Which ways islands were solved in, see choices.h.
 struct ModelShares {
-  ModelShare flights;                                     // bodies that touched nothing
-  std::array<ModelShare, kMostSubstepLevel + 1> solved;   // by the power of two that the sub-steps are, or lie below
-  std::uint64_t joints_together = 0, joints_alone = 0;    // solved as a whole with others; alone
-  std::uint64_t turning_flights = 0;                      // flights with gyroscopic terms
-  std::uint64_t bouncing = 0;                             // contacts of pairs that bounce
+  ModelShare flights;                                    // bodies that touched nothing
+  std::array<ModelShare, kMostSubstepLevel + 1> solved;  // by the power of two that the sub-steps are, or lie below
+  std::uint64_t joints_together = 0, joints_alone = 0;   // solved as a whole with others; alone
+  std::uint64_t turning_flights = 0;                     // flights with gyroscopic terms
+  std::uint64_t bouncing = 0;                            // contacts of pairs that bounce
 };
 
 struct StepCounters {

@@ -38,11 +38,12 @@ constexpr int kMostImpactRounds = 64;   // over an island, in one sub-step; what
 // ---- how many sub-steps an island gets, where its scene does not say
 constexpr std::uint32_t kLeastSubstepLevel = 1;  // 2 sub-steps ...
 constexpr std::uint32_t kMostSubstepLevel = 5;   // ... to 32
-constexpr double kSagShare = 0.1;   // of a body's smallest half extent, by which the contact that carries all above gives
-constexpr double kDepthRate = 60;   // 1/s; sub-steps per second and root of the contacts between a body and the ground
+constexpr double kSagShare =
+    0.1;  // of a body's smallest half extent, by which the contact that carries all above gives
+constexpr double kDepthRate = 60;  // 1/s; sub-steps per second and root of the contacts between a body and the ground
 constexpr double kSofterBelow = 0.4;  // contacts get softer again where less than this share of the sub-steps would do
-constexpr double kTurnPerSubstep = 0.25;       // rad
-constexpr double kSagitta = 1e-4;              // m; a body on a joint leaves its circle by this much in a sub-step
+constexpr double kTurnPerSubstep = 0.25;  // rad
+constexpr double kSagitta = 1e-4;         // m; a body on a joint leaves its circle by this much in a sub-step
 constexpr double kMostSubstepsForTravel = 8;
 
 // ---- joints: stiffer than contacts, since both signs of an impulse are allowed

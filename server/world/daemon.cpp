@@ -234,7 +234,8 @@ wire::Status Daemon::status() const {
     s.shares()[at].contacts(of.contacts);
     s.shares()[at].seconds(of.seconds);
   };
-  static_assert(std::tuple_size_v<std::remove_reference_t<decltype(s.shares())>> == 1 + std::tuple_size_v<decltype(stats.shares.solved)>);
+  static_assert(std::tuple_size_v<std::remove_reference_t<decltype(s.shares())>> ==
+                1 + std::tuple_size_v<decltype(stats.shares.solved)>);
   share(0, stats.shares.flights);
   for (std::size_t k = 0; k < stats.shares.solved.size(); ++k) share(k + 1, stats.shares.solved[k]);
   s.joints_together(stats.shares.joints_together);

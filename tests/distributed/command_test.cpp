@@ -67,6 +67,31 @@ TEST_F(Command, NoStepsAtAllIsARunToo) {
   expect_equal_logs(path("a"), path("b"));
 }
 
+TEST_F(Command, ExplainTellsHowASceneWasModelled) {
+  const std::string towers = scene("towers", 200);
+  for (const char* worlds : {"1", "3"}) {
+    const std::string output =
+        run({"run", towers, "--worlds", worlds, "--steps", "60", "--pace", "max", "--explain", "-q"});
+    const auto at = output.find("solved in 4 sub-steps");
+    ASSERT_NE(at, std::string::npos) << output;
+    // Twenty towers of ten; on several worlds some are solved by two of them, or twice.
+    double islands = 0, bodies = 0, contacts = 0, micro = 0;
+    ASSERT_EQ(
+        std::sscanf(output.c_str() + at, "solved in 4 sub-steps %lf %lf %lf %lf", &islands, &bodies, &contacts, &micro),
+        4)
+        << output;
+    EXPECT_GT(islands, 19);
+    EXPECT_LT(islands, 120);
+    EXPECT_NEAR(bodies, 10 * islands, 1);
+    EXPECT_GT(micro, 1);
+  }
+  EXPECT_EQ(run({"run", towers, "--sync", "single", "--steps", "10", "--pace", "max"}).find("sub-steps"),
+            std::string::npos);
+  const std::string machines =
+      run({"run", scene("machines", 60), "--sync", "single", "--steps", "60", "--pace", "max", "--explain", "-q"});
+  EXPECT_NE(machines.find("joints solved as a whole"), std::string::npos) << machines;
+}
+
 TEST_F(Command, DiffNamesTheFirstStepThatDiffers) {
   const std::string file = scene("cubes", 50);
   run({"run", file, "--sync", "single", "--steps", "20", "--pace", "max", "--hash-log", path("a.log")});

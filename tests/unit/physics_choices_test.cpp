@@ -1,8 +1,8 @@
 // What an island gets of the step: more where it needs more, and the same however it is looked at.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <Eigen/Dense>
+#include <cmath>
 
 #include "common/scene/random.h"
 #include "common/scene/scene_builder.h"

@@ -255,7 +255,8 @@ double gape_of_chain(double load, JointMethod method, std::uint32_t substeps) {
   builder.scene.joint_method = method;
   builder.scene.substeps = substeps;
   for (int i = 0; i < 20; ++i) {
-    builder.add(Capsule{0.03, 0.1}, Vec3(0, 0, -0.1 - 0.2 * i), Quat::Identity(), 1 / (4.0 / 3 * kPi * 2.7e-5 + kPi * 9e-5));
+    builder.add(Capsule{0.03, 0.1}, Vec3(0, 0, -0.1 - 0.2 * i), Quat::Identity(),
+                1 / (4.0 / 3 * kPi * 2.7e-5 + kPi * 9e-5));
     builder.add_joint(JointKind::kBall, i, i == 0 ? SceneBuilder::kWorld : i - 1, Vec3(0, 0, -0.2 * i));
   }
   builder.add(Box{Vec3(0.4, 0.4, 0.4)}, Vec3(0, 0, -4.2), Quat::Identity(), load / 0.064);
@@ -327,8 +328,8 @@ TEST(Joint, AUniversalJointBendsBothWaysAndPassesTurnsOn) {
   // One yoke across the first shaft, the other across the second: both across each other.
   Joint& joint = builder.add_joint(JointKind::kUniversal, 0, 1, Vec3::Zero(), Vec3::UnitX());
   joint.frame_a = frame_in(builder.scene.bodies[0].pose, universal_frame(Vec3::Zero(), Vec3::UnitY(), Vec3::UnitZ()));
-  joint.frame_b = frame_in(builder.scene.bodies[1].pose,
-                           universal_frame(Vec3::Zero(), Vec3::UnitY(), bend * Vec3::UnitZ()));
+  joint.frame_b =
+      frame_in(builder.scene.bodies[1].pose, universal_frame(Vec3::Zero(), Vec3::UnitY(), bend * Vec3::UnitZ()));
   World world(builder);
   world.run(0.5);
   double first = 0, second = 0, least = 1e9, most = 0;
@@ -342,7 +343,7 @@ TEST(Joint, AUniversalJointBendsBothWaysAndPassesTurnsOn) {
     EXPECT_LT(world.gap(2), 1e-3);
   }
   EXPECT_NEAR(first, 4 * kPi, 0.05);
-  EXPECT_NEAR(second, first, 0.02);  // turn for turn ...
+  EXPECT_NEAR(second, first, 0.02);             // turn for turn ...
   EXPECT_NEAR(least, std::cos(kPi / 9), 0.02);  // ... but uneven, by the cosine of the bend either way
   EXPECT_NEAR(most, 1 / std::cos(kPi / 9), 0.02);
 }
