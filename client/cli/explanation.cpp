@@ -8,7 +8,7 @@
 
 namespace soda::cli {
 
-void print_explanation(const Collector& collector) {
+void print_explanation(const Collector& collector, std::uint32_t substeps) {
   if (!collector.session()) return;
   const double steps = static_cast<double>(std::max<Step>(1, collector.whole_steps() - 1));
   wire::Status sum;
@@ -33,7 +33,9 @@ void print_explanation(const Collector& collector) {
     const wire::ModelShare& share = sum.shares()[k];
     if (share.islands() == 0) continue;
     islands += share.islands();
-    const std::string name = k == 0   ? "touching nothing: exact flight"
+    const std::string name = k == 0 ? "touching nothing: exact flight"
+                             : substeps != 0
+                                 ? fmt::format("solved in {} sub-step{}", substeps, substeps == 1 ? "" : "s")
                              : k == 1 ? "solved in 1 sub-step"
                                       : fmt::format("solved in {} sub-steps", 1u << (k - 1));
     text += fmt::format("  {:<34}{:>10.1f}{:>10.1f}{:>10.1f}{:>12.1f}{:>7.1f}%\n", name,
@@ -49,7 +51,11 @@ void print_explanation(const Collector& collector) {
   line("contacts that bounce", sum.bouncing());
   line("joints solved as a whole", sum.joints_together());
   line("joints solved one by one", sum.joints_alone());
-  text += "Sub-steps are chosen for each island by its state, unless the scene fixes them: model { substeps: 4 }.\n";
+  text +=
+      substeps != 0
+          ? "The scene fixes the sub-steps (model { substeps }); left out, they are chosen for each island by its "
+            "state.\n"
+          : "Sub-steps are chosen for each island by its state, unless the scene fixes them: model { substeps: 4 }.\n";
   std::fputs(text.c_str(), stdout);
   std::fflush(stdout);
 }

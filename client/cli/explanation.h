@@ -5,7 +5,8 @@
 
 namespace soda::cli {
 
-// To standard output, as a table; sums over all worlds, per step of the run. Says so where nothing was heard.
-void print_explanation(const Collector& collector);
+// To standard output, as a table; sums over all worlds, per step of the run. Nothing where no world was heard of.
+// `substeps`: that the scene fixes; 0: none.
+void print_explanation(const Collector& collector, std::uint32_t substeps);
 
 }  // namespace soda::cli

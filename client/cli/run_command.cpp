@@ -70,6 +70,7 @@ int run(RunOptions& options) {
   signals.on_stop([&] { std::_Exit(128 + signals.received()); });
   const Scene scene = load(options);
   signals.on_stop(nullptr);
+  options.follow.substeps = scene.substeps;
   return launch(options, scene, log_of(options.actions, scene), signals);
 }
 

@@ -117,7 +117,7 @@ int follow(ReportSource& source, Processes& processes, Table& table, StopSignals
     code = kExitFailed;
   }
   print_summary(collector, complete);
-  if (options.explain) print_explanation(collector);
+  if (options.explain) print_explanation(collector, options.substeps);
   return code;
 }
 

@@ -20,7 +20,8 @@ struct FollowOptions {
   std::filesystem::path stats;  // file to write; empty: none
   bool quiet = false;
   bool verbose = false;
-  bool explain = false;  // tell how the scene was modelled, and what that cost
+  bool explain = false;        // tell how the scene was modelled, and what that cost
+  std::uint32_t substeps = 0;  // that the scene fixes; 0: none
 };
 
 // Returns the command's exit code: 0, 1 if a daemon or the report failed, 2 if a daemon refused its scene or options,

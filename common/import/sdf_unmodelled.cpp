@@ -17,6 +17,7 @@ const std::map<std::string, std::vector<std::string>>& understood() {
       {"model", {"pose", "static", "frame", "link", "model", "include", "joint"}},
       {"joint", {"pose", "parent", "child", "axis", "axis2"}},
       {"axis", {"xyz", "limit", "dynamics"}},
+      {"axis2", {"xyz", "limit", "dynamics"}},
       {"limit", {"lower", "upper"}},
       {"dynamics", {}},
       {"link", {"pose", "inertial", "collision", "visual"}},

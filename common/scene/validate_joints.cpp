@@ -10,6 +10,8 @@ using namespace checks;
 
 namespace {
 
+constexpr double kMostCosineOfUniversal = 0.1;
+
 bool has_axis(JointKind kind) {
   return kind == JointKind::kHinge || kind == JointKind::kSlider || kind == JointKind::kDistance;
 }
@@ -56,6 +58,14 @@ MaybeProblem ends_problem(const Scene& scene, const Joint& joint) {
   const Vec3 place_a = (a->pose * joint.frame_a).position;
   const Vec3 place_b = b ? (b->pose * joint.frame_b).position : joint.frame_b.position;
   const double apart = (place_a - place_b).norm(), most = joint_reach_a(scene, joint) + joint_reach_b(scene, joint);
+  if (joint.kind == JointKind::kUniversal) {
+    const Quat turn_b = b ? b->pose.orientation * joint.frame_b.orientation : joint.frame_b.orientation;
+    const double cosine = (a->pose.orientation * joint.frame_a.orientation * Vec3::UnitX()).dot(turn_b * Vec3::UnitY());
+    if (!(std::abs(cosine) <= kMostCosineOfUniversal))
+      return Problem{
+          "universal",
+          "x of frame a and y of frame b must be across each other, the cosine of their angle is " + number(cosine)};
+  }
   if (!(apart <= most))
     return Problem{"", "the bodies are " + number(apart) + " m apart at this joint; at most " + number(most) + " m"};
   return {};

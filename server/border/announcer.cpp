@@ -36,7 +36,7 @@ void Announcer::update(Step step) {
   for (const timeline::Slot slot : changed) {
     const Ref<timeline::Record> record = context_.timeline.share(step, slot);
     if (!record || (record->place.inside && record->place.owner == context_.settings.me)) continue;
-    context_.neighbourhood.hearers(record->body, hearers_);
+    context_.neighbourhood.hearers(record->body, step, hearers_);
     for (std::size_t l = 0; l < books_.size(); ++l)
       if (std::binary_search(hearers_.begin(), hearers_.end(), context_.links[l].peer()))
         added[l].push_back({slot, record, {}});

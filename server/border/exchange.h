@@ -32,7 +32,8 @@ struct KeptIsland {
 };
 
 struct Exchange {
-  explicit Exchange(const Neighbourhood& neighbourhood, std::size_t links) : parts(neighbourhood), told(links) {}
+  Exchange(const Neighbourhood& neighbourhood, Step step, std::size_t links)
+      : parts(neighbourhood, step), told(links) {}
 
   std::vector<KeptIsland> kept;
   bool retry = false;      // something has come since islands were last tried

@@ -87,7 +87,7 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
     }
     for (const BodyState& body : component.set.bodies) {
       if (!neighbourhood_->is_wide(body)) continue;
-      neighbourhood_->reached(body, reached);
+      neighbourhood_->reached(body, step_, reached);
       for (const WorldId world : reached)
         if (const Indexed* part = part_of(world)) {
           const auto [first, last] = part->port_users.equal_range(body.id);

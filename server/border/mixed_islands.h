@@ -25,7 +25,7 @@ struct ProtocolError : std::logic_error {
 
 class MixedIslands {
  public:
-  explicit MixedIslands(const Neighbourhood& neighbourhood) : neighbourhood_(&neighbourhood) {}
+  MixedIslands(const Neighbourhood& neighbourhood, Step step) : neighbourhood_(&neighbourhood), step_(step) {}
 
   struct Key {
     WorldId origin = 0;
@@ -63,6 +63,7 @@ class MixedIslands {
     std::unordered_multimap<BodyId, std::uint32_t> port_users;  // port -> components
   };
   const Neighbourhood* neighbourhood_;
+  Step step_;
   std::map<WorldId, Indexed> parts_;
 };
 

@@ -1,11 +1,11 @@
-// Who must hear of which body: geometry of territories, fixed for a session.
+// Who must hear of which body: geometry of territories.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "common/body_state.h"
-#include "common/territory.h"
+#include "server/border/territories.h"
 #include "server/physics/model.h"
 #include "server/timeline/record.h"
 
@@ -13,41 +13,43 @@ namespace soda::border {
 
 class Neighbourhood {
  public:
-  // `model` and `map` must outlive it.
-  Neighbourhood(const physics::Model& model, const TerritoryMap& map, WorldId me);
+  // `model` and `territories` must outlive it.
+  Neighbourhood(const physics::Model& model, const Territories& territories, WorldId me);
 
-  // A body has been added to the model.
-  void model_grew();
+  void model_grew();          // a body has been added to the model
+  void territories_change();  // a transfer has become known
 
-  // Worlds with a cell so near to one of ours that a body can matter to both: within two cells, or more where the
-  // scene's largest body, or its largest speed, reaches further. Ascending.
+  // Worlds with a cell so near to one of ours, at any step that is known of, that a body can matter to both: within two
+  // cells, or more where the scene's largest body, or its largest speed, reaches further. Ascending; only ever grows.
   const std::vector<WorldId>& neighbours() const { return neighbours_; }
 
-  WorldId owner(const BodyState& body) const { return map_.owner_of(body.x()); }
-  std::size_t own_cells() const { return own_cells_; }
+  WorldId owner(const BodyState& body, Step step) const { return territories_.owner_of(body.x(), step); }
+  std::size_t own_cells(Step step) const { return territories_.cells_of(me_, step); }
   double half_cell() const { return half_edge_; }  // m
 
-  timeline::Place place(const BodyState& body) const;
-  bool is_wide(const BodyState& body) const { return place(body).wide; }
+  timeline::Place place(const BodyState& body, Step step) const;
+  bool is_wide(const BodyState& body) const;
+  // Whether cells change hands at a step; and then, whether that can matter to whoever hears of a body.
+  bool places_change(Step step) const { return territories_.change_at(step); }
+  bool place_changes(const BodyState& body, Step step) const;
 
   // The worlds other than the body's owner that its reach box, enlarged by half a cell, reaches. Ascending.
-  void reached(const BodyState& body, std::vector<WorldId>& worlds) const;
+  void reached(const BodyState& body, Step step, std::vector<WorldId>& worlds) const;
   // The worlds that must hear of a body that this world produced: its owner, and those that it reaches; not this world.
   // For a body that is inside this world's own territory: nobody.
-  void hearers(const BodyState& body, std::vector<WorldId>& worlds) const;
+  void hearers(const BodyState& body, Step step, std::vector<WorldId>& worlds) const;
 
  private:
-  void reached_by_box(const BodyState& body, std::vector<WorldId>& worlds) const;
+  std::size_t cell_of(const BodyState& body) const;
+  void reached_by_box(const BodyState& body, Step step, std::vector<WorldId>& worlds) const;
   const physics::Model& model_;
-  const TerritoryMap& map_;
+  const Territories& territories_;
+  const int range_;  // cells
   WorldId me_;
   std::vector<WorldId> neighbours_;
-  std::size_t own_cells_ = 0;
   double half_edge_ = 0;
   // By body: below this square of its speed, (m/s)^2, its reach box cannot leave half a cell, however it turns.
   std::vector<double> ordinary_below_;
-  // By cell: the one world that owns every cell within one cell, or kNoWorld.
-  std::vector<WorldId> sole_;
 };
 
 }  // namespace soda::border

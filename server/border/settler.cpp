@@ -12,7 +12,7 @@ using State = KeptIsland::State;
 // ---- what the timeline finds
 
 void Settler::extended(Step step) {
-  Exchange next(context_.neighbourhood, context_.links.size());
+  Exchange next(context_.neighbourhood, step, context_.links.size());
   if (!exchanges_.empty())
     for (const KeptIsland& island : exchanges_.back().kept)
       if (island.shared) {
@@ -260,12 +260,12 @@ std::set<WorldId> Settler::hearers(Step step) const {
     for (const Port& port : island.component->ports) worlds.insert(port.owner);
     for (const BodyState& body : island.component->set.bodies) {
       if (!context_.neighbourhood.is_wide(body)) continue;
-      context_.neighbourhood.reached(body, reached);  // whoever it reaches must say what touches it there
+      context_.neighbourhood.reached(body, step, reached);  // whoever it reaches must say what touches it there
       worlds.insert(reached.begin(), reached.end());
     }
   }
   context_.timeline.for_each_foreign_wide(step, [&](timeline::Slot, const timeline::Record& record) {
-    context_.neighbourhood.reached(record.body, reached);
+    context_.neighbourhood.reached(record.body, step, reached);
     if (std::binary_search(reached.begin(), reached.end(), context_.settings.me)) worlds.insert(record.place.owner);
   });
   worlds.erase(context_.settings.me);

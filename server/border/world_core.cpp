@@ -19,10 +19,10 @@ class WorldCore::Impl final : timeline::Arbiter {
  public:
   Impl(physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer)
       : model_(model),
-        map_(map),
+        territories_(with(map, settings.transfers)),
         settings_(settings),
         observer_(observer),
-        neighbourhood_(model, map, settings.me),
+        neighbourhood_(model, territories_, settings.me),
         links_(make_links()),
         context_{model_, settings_, neighbourhood_, timeline_, links_, stats_, final_},
         announcer_(context_),
@@ -44,7 +44,7 @@ class WorldCore::Impl final : timeline::Arbiter {
       if (!link) throw CodecError("border message from world " + std::to_string(h.from) + ", which is no neighbour");
       if (h.logged > logged_) return hold_back(h.logged, bytes);
       Message message = decode(bytes, model_);
-      check(message, settings_.me, map_.worlds);
+      check(message, settings_.me, territories_.worlds());
       return take(*link, std::move(message));
     } catch (const CodecError& error) {
       return refuse(error);
@@ -328,6 +328,12 @@ class WorldCore::Impl final : timeline::Arbiter {
  private:
   friend class WorldCore;
 
+  static Territories with(const TerritoryMap& map, const std::vector<Transfer>& transfers) {
+    Territories territories(map);
+    for (const Transfer& transfer : transfers) territories.add(transfer);
+    return territories;
+  }
+
   std::vector<Link> make_links() const {
     std::vector<Link> links;
     for (const WorldId n : neighbourhood_.neighbours())
@@ -336,7 +342,11 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // ---- Arbiter
-  timeline::Place place(const BodyState& body) const override { return neighbourhood_.place(body); }
+  timeline::Place place(const BodyState& body, Step step) const override { return neighbourhood_.place(body, step); }
+  bool places_change(Step step) const override { return neighbourhood_.places_change(step); }
+  bool place_changes(const BodyState& body, Step step) const override {
+    return neighbourhood_.place_changes(body, step);
+  }
   void extended(Step step) override {
     settler_.extended(step);
     announcer_.extend(step);
@@ -368,7 +378,7 @@ class WorldCore::Impl final : timeline::Arbiter {
 
     std::vector<Ref<timeline::NearSet>> sets;
     for (const Frame& frame : message.frames) {
-      sets.push_back(timeline_.near_set(frame.set));
+      sets.push_back(timeline_.near_set(frame.set, frame.step));
       for (const timeline::NearSet::Body& b : sets.back()->bodies) check_body(*b.record);
     }
     const std::size_t source = context_.index_of(link);
@@ -428,7 +438,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   physics::Model& model_;
-  const TerritoryMap& map_;
+  Territories territories_;
   const CoreSettings settings_;
   Observer& observer_;
   CoreStats stats_;
@@ -476,7 +486,7 @@ bool WorldCore::touches_foreign(Step step, timeline::Slot slot) const {
   return impl_->timeline_.touches_foreign(step, slot);
 }
 std::size_t WorldCore::own_bodies() const { return impl_->timeline_.count(impl_->timeline_.newest()); }
-std::size_t WorldCore::own_cells() const { return impl_->neighbourhood_.own_cells(); }
+std::size_t WorldCore::own_cells() const { return impl_->neighbourhood_.own_cells(impl_->timeline_.newest()); }
 const CoreStats& WorldCore::stats() const { return impl_->stats(); }
 void WorldCore::touch(Step step, std::span<const BodyId> bodies) { impl_->touch(step, bodies); }
 bool WorldCore::is_indexed() const { return impl_->timeline_.is_indexed(); }

@@ -18,6 +18,7 @@
 #include "common/body_set.h"
 #include "common/ids.h"
 #include "common/territory.h"
+#include "server/border/territories.h"
 #include "server/physics/model.h"
 #include "server/timeline/timeline.h"
 
@@ -32,8 +33,9 @@ struct CoreSettings {
                               // messages are refused
   Step last_step = 0;         // the run ends when this step is final
   Sync sync = Sync::kAnticipative;
-  Step window = 48;      // K: steps beyond the final one that may be computed
-  bool measure = false;  // keep the CPU time of CoreStats::shares
+  Step window = 48;                 // K: steps beyond the final one that may be computed
+  bool measure = false;             // keep the CPU time of CoreStats::shares
+  std::vector<Transfer> transfers = {};  // of cells, that all worlds know of from the start
   bool actions = false;  // no step becomes final before close_actions() has said that nothing will be done at it
 };
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <stdexcept>
+#include <utility>
 
 #include "server/physics/tuning.h"
 
@@ -24,34 +26,48 @@ bool is_fixed(const BodyModel& body) { return body.inverse_mass == 0; }
 }  // namespace
 
 // How far each body is from something that does not give way, in contacts; joints are solved as a whole and count
-// nothing. Returns the largest, 0 where nothing rests on anything.
+// nothing. Returns the largest, 0 where nothing rests on anything. Breadth first, what costs nothing at once.
 std::uint32_t Chooser::depth_from_ground(const IslandView& island) {
+  constexpr std::uint32_t kNone = 0xffffffffu;
   depth_.resize(std::max(depth_.size(), island.states.size()));
-  for (const std::uint32_t i : island.bodies) depth_[i] = is_fixed(*island.models[i]) ? 0 : kNotGrounded;
-  for (const std::uint32_t c : island.contacts)
-    if (island.ends[c].b == kStaticSlot && depth_[island.ends[c].a] > 0)
-      depth_[island.ends[c].a] = is_joint(island.records[c]) ? 0 : 1;
-  // Relaxation in both directions until nothing changes: few rounds, since contacts come in spatial order of a sort.
-  bool changed = true;
-  const auto relax = [&](std::uint32_t c) {
-    if (island.ends[c].b == kStaticSlot) return;
-    std::uint32_t &a = depth_[island.ends[c].a], &b = depth_[island.ends[c].b];
-    const std::uint32_t nearer = std::min(a, b), farther = std::max(a, b);
-    if (nearer == kNotGrounded) return;
-    const std::uint32_t reached = nearer + (is_joint(island.records[c]) ? 0 : 1);
-    if (reached >= farther) return;
-    (a > b ? a : b) = reached;
-    changed = true;
-  };
-  while (changed) {
-    changed = false;
-    for (const std::uint32_t c : island.contacts) relax(c);
-    if (!changed) break;
-    for (auto c = island.contacts.rbegin(); c != island.contacts.rend(); ++c) relax(*c);
+  first_.resize(depth_.size());
+  next_.resize(std::max(next_.size(), 2 * island.contacts.size()));
+  for (const std::uint32_t i : island.bodies) {
+    depth_[i] = is_fixed(*island.models[i]) ? 0 : kNotGrounded;
+    first_[i] = kNone;
+  }
+  // Ends of contacts between two bodies, as a list for each body.
+  for (std::uint32_t k = 0; k < island.contacts.size(); ++k) {
+    const Ends& ends = island.ends[island.contacts[k]];
+    if (ends.b == kStaticSlot) {
+      depth_[ends.a] = std::min(depth_[ends.a], is_joint(island.records[island.contacts[k]]) ? 0u : 1u);
+    } else {
+      next_[2 * k] = std::exchange(first_[ends.a], 2 * k);
+      next_[2 * k + 1] = std::exchange(first_[ends.b], 2 * k + 1);
+    }
   }
   std::uint32_t deepest = 0;
+  level_.clear();
+  later_.clear();
   for (const std::uint32_t i : island.bodies)
-    if (depth_[i] != kNotGrounded) deepest = std::max(deepest, depth_[i]);
+    if (depth_[i] != kNotGrounded) (depth_[i] == 0 ? level_ : later_).push_back(i);
+  for (std::uint32_t depth = 0; !level_.empty() || !later_.empty(); ++depth) {
+    for (std::size_t at = 0; at < level_.size(); ++at) {
+      const std::uint32_t body = level_[at];
+      if (depth_[body] != depth) continue;  // has been reached earlier
+      deepest = depth;
+      for (std::uint32_t end = first_[body]; end != kNone; end = next_[end]) {
+        const std::uint32_t contact = island.contacts[end / 2];
+        const std::uint32_t other = end % 2 ? island.ends[contact].a : island.ends[contact].b;
+        const bool joint = is_joint(island.records[contact]);
+        if (depth_[other] <= depth + (joint ? 0 : 1)) continue;
+        depth_[other] = depth + (joint ? 0 : 1);
+        (joint ? level_ : later_).push_back(other);
+      }
+    }
+    level_.clear();
+    level_.swap(later_);
+  }
   return deepest;
 }
 
@@ -60,7 +76,8 @@ std::uint32_t Chooser::depth_from_ground(const IslandView& island) {
 // the square of the sub-steps, for what one pass takes to run through it.
 double Chooser::stiffness_wanted(const IslandView& island) {
   const double gravity = constants_.gravity.norm();
-  if (!(gravity > 0)) return 0;
+  const auto touch = [&](std::uint32_t c) { return !is_joint(island.records[c]); };
+  if (!(gravity > 0) || std::none_of(island.contacts.begin(), island.contacts.end(), touch)) return 0;
   const double deepest = depth_from_ground(island);
   double slenderness = 0;  // largest mass ratio over size, 1/m
   for (const std::uint32_t c : island.contacts) {
@@ -87,7 +104,9 @@ double Chooser::stiffness_wanted(const IslandView& island) {
 // What hangs on a joint goes round it: at speed v and distance r, it is off its circle by a sagitta of (v h)^2 / 8 r in
 // a sub-step.
 double Chooser::swing_wanted(const IslandView& island, std::uint32_t record) const {
-  const JointModel& joint = *model_.find_joint(island.records[record]);
+  const JointModel* const found = model_.find_joint(island.records[record]);
+  if (!found) throw std::invalid_argument("step: a record names a joint that is not in the scene");
+  const JointModel& joint = *found;
   const Ends& ends = island.ends[record];
   const BodyState* const b = ends.b == kStaticSlot ? nullptr : &island.states[ends.b];
   const BodyState& a = island.states[ends.a];

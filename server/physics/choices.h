@@ -46,7 +46,8 @@ class Chooser {
 
   const Model& model_;
   const StepConstants& constants_;
-  std::vector<std::uint32_t> depth_;  // scratch, by position of the body
+  std::vector<std::uint32_t> depth_, first_;         // scratch, by position of the body
+  std::vector<std::uint32_t> next_, level_, later_;  // scratch
 };
 
 // Sub-steps in which a body that touches nothing turns through a step: more than one only where its inertia is not the

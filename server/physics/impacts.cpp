@@ -57,12 +57,6 @@ class Pair {
   Vec3 b_v_ = Vec3::Zero(), b_w_ = Vec3::Zero();
 };
 
-// How much of an impulse may be applied so that its work is not positive: with impulse s p it is s b + s^2 (w - b).
-double allowed(double work, double first_order) {
-  if (work <= 0) return 1;
-  return first_order < 0 ? -first_order / (work - first_order) : 0;
-}
-
 void rub(Pair& pair, const Batch& batch, int lane, double pressed) {
   const Line line[2] = {pair.line(batch.slide[0], lane, get(batch.tangent[0], lane)),
                         pair.line(batch.slide[1], lane, get(batch.tangent[1], lane))};

@@ -1,6 +1,7 @@
 // Which joints are solved together, and the matrix of each such cluster.
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "server/physics/joints.h"
 #include "server/physics/solver_kernel.h"
@@ -43,10 +44,9 @@ void JointSolver::gather(std::uint32_t start, std::vector<std::uint32_t>& found)
   for (std::size_t k = 0; k < found.size(); ++k) {
     const Work& work = work_[found[k]];
     for (const std::uint32_t body : {work.a, work.b}) {
-      if (body == kNoBody) continue;
+      if (body == kNoBody || std::exchange(seen_body_[body], sight_) == sight_) continue;
       for (const std::uint32_t joint : joints_at(body)) {
-        if (seen_[joint] == sight_) continue;
-        seen_[joint] = sight_;
+        if (std::exchange(seen_[joint], sight_) == sight_) continue;
         found.push_back(joint);
       }
     }
@@ -75,6 +75,8 @@ void JointSolver::arrange(std::span<const MovingBody> bodies) {
     for (const std::uint32_t body : {work_[k].a, work_[k].b})
       if (by(work_[k], body)) at_[--first_at_[body]] = k;
   seen_.resize(std::max(seen_.size(), used_), 0);
+  seen_body_.resize(std::max(seen_body_.size(), bodies.size()), 0);
+  first_row_at_.assign(bodies.size(), kNotPlaced);
   done_.assign(used_, false);
   for (std::uint32_t k = 0; k < used_; ++k) {
     if (done_[k]) continue;
@@ -85,36 +87,52 @@ void JointSolver::arrange(std::span<const MovingBody> bodies) {
     add_cluster(again_);
   }
   solution_.resize(matrix_.size());
+  pull_.resize(matrix_.size());
 }
 
 void JointSolver::add_cluster(std::span<const std::uint32_t> members) {
   const std::uint32_t begin = matrix_.size();
-  const auto place = [&](std::span<const std::uint32_t> some, bool whole) {
-    const auto first = static_cast<std::uint32_t>(order_.size());
-    order_.insert(order_.end(), some.begin(), some.end());
-    clusters_.push_back({first, static_cast<std::uint32_t>(order_.size()), whole});
-    for (const std::uint32_t k : some) work_[k].first_row = kNotPlaced;
-    for (const std::uint32_t k : some) {
-      Work& work = work_[k];
-      work.first_row = matrix_.size();
-      // It reaches back to the first one that it shares a body with.
-      std::uint32_t reach = work.first_row;
-      if (some.size() > 1)
-        for (const std::uint32_t body : {work.a, work.b})
-          if (body != kNoBody)
-            for (const std::uint32_t other : joints_at(body)) reach = std::min(reach, work_[other].first_row);
-      for (int i = 0; i < work.held; ++i) matrix_.add_row(reach);
-    }
+  std::size_t rows = 0;
+  for (const std::uint32_t k : members) rows += static_cast<std::size_t>(work_[k].held);
+  const std::size_t most = std::max(kMostDirectWork, kMostDirectWorkPerRow * rows);
+  std::size_t spent = 0;
+  const auto add_rows = [&](Work& work, std::uint32_t reach) {
+    work.first_row = matrix_.size();
+    for (int i = 0; i < work.held; ++i) matrix_.add_row(reach);
   };
-  place(members, method_ != JointMethod::kIterated);
-  if (members.size() == 1 || method_ == JointMethod::kDirect || matrix_.work(begin) <= kMostDirectWork) {
+  const auto first_order = static_cast<std::uint32_t>(order_.size());
+  bool whole = method_ != JointMethod::kIterated;
+  for (const std::uint32_t k : members) {
+    Work& work = work_[k];
+    // It reaches back to the first one that it shares a body with.
+    std::uint32_t reach = matrix_.size();
+    if (members.size() > 1)
+      for (const std::uint32_t body : {work.a, work.b})
+        if (body != kNoBody && !joints_at(body).empty()) {
+          first_row_at_[body] = std::min(first_row_at_[body], matrix_.size());
+          reach = std::min(reach, first_row_at_[body]);
+        }
+    const std::size_t width = matrix_.size() - reach + static_cast<std::size_t>(work.held);
+    spent += width * width * static_cast<std::size_t>(work.held);
+    if (members.size() > 1 && method_ != JointMethod::kDirect && spent > most) {
+      whole = false;
+      break;
+    }
+    add_rows(work, reach);
+  }
+  if (whole || members.size() == 1) {
+    order_.insert(order_.end(), members.begin(), members.end());
+    clusters_.push_back({first_order, static_cast<std::uint32_t>(order_.size()), whole});
     (members.size() > 1 ? together : alone) += members.size();
     return;
   }
   matrix_.cut(begin);
-  order_.resize(clusters_.back().first);
-  clusters_.pop_back();
-  for (const std::uint32_t& k : members) place({&k, 1}, false);
+  for (const std::uint32_t k : members) {
+    add_rows(work_[k], matrix_.size());
+    order_.push_back(k);
+    clusters_.push_back(
+        {static_cast<std::uint32_t>(order_.size() - 1), static_cast<std::uint32_t>(order_.size()), false});
+  }
   alone += members.size();
 }
 

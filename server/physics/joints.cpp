@@ -161,7 +161,11 @@ void JointSolver::prepare(Work& work, std::span<const MovingBody> bodies) const 
     }
     case JointKind::kUniversal: {
       const Vec3 x_a = axes_a.col(0), y_b = b.frame * Vec3::UnitY();
-      hold(angular_row(y_b.cross(x_a)), x_a.dot(y_b));
+      const Vec3 cross = y_b.cross(x_a);
+      const double sine = cross.norm();
+      // Parallel, any axis across will do to part them.
+      const Vec3 axis = sine > 1e-9 ? Vec3(cross / sine) : Vec3(axes_a.col(2));
+      hold(angular_row(axis), 0.5 * std::numbers::pi - angle_of(sine, x_a.dot(y_b)));
       break;
     }
     case JointKind::kHinge: {
@@ -284,16 +288,35 @@ void JointSolver::push_held(const Cluster& cluster, std::span<MovingBody> bodies
                         : !bias             ? kRigid
                         : cluster.whole     ? stiff_whole_
                                             : stiff_;
-  const std::span x(solution_.data(), end - begin);
+  // What stops them moving apart, and what pulls them together.
+  const std::span x(solution_.data(), end - begin), pull(pull_.data(), end - begin);
+  double mass = 0;
+  bool pulls = false;
   for (std::uint32_t k = cluster.first; k < cluster.end; ++k) {
     const Work& work = work_[order_[k]];
     const MovingBody& a = bodies[work.a];
     const MovingBody* const b = work.b == kNoBody ? nullptr : &bodies[work.b];
-    for (int i = 0; i < work.held; ++i)
-      x[work.first_row - begin + static_cast<std::uint32_t>(i)] =
-          speed_along(work.row[i], a, b) + soft.bias_rate * work.error[i];
+    for (const MovingBody* body : {&a, b})
+      if (body && body->inverse_mass > 0) mass += 1 / body->inverse_mass;
+    for (int i = 0; i < work.held; ++i) {
+      const std::uint32_t at = work.first_row - begin + static_cast<std::uint32_t>(i);
+      x[at] = speed_along(work.row[i], a, b);
+      pull[at] = soft.bias_rate * work.error[i];
+      pulls = pulls || pull[at] != 0;
+    }
   }
   matrix_.solve(begin, end, x);
+  if (pulls) {
+    // Where rows say nearly the same, as in closed rings, a small gap would take a large motion: the energy of it is
+    // limited.
+    solution_of_pull_.assign(pull.begin(), pull.end());
+    matrix_.solve(begin, end, solution_of_pull_);
+    double twice_energy = 0;
+    for (std::size_t i = 0; i < pull.size(); ++i) twice_energy += pull[i] * solution_of_pull_[i];
+    const double most = mass * kPullTogetherSpeed * kPullTogetherSpeed;
+    const double share = twice_energy > most ? std::sqrt(most / twice_energy) : 1;
+    for (std::size_t i = 0; i < pull.size(); ++i) x[i] += share * solution_of_pull_[i];
+  }
   for (std::uint32_t k = cluster.first; k < cluster.end; ++k) {
     Work& work = work_[order_[k]];
     MovingBody& a = bodies[work.a];

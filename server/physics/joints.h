@@ -31,7 +31,8 @@ class JointSolver {
   void arrange(std::span<const MovingBody> bodies);
   // Begins a sub-step of h s: applies what the joints carried in the one before.
   void begin(std::span<MovingBody> bodies, double h);
-  // One pass over all joints, in the order in which they were added. `bias`: pull together what has come apart.
+  // One pass over all clusters: first limits, motors and springs, joint by joint, then what is held, as a whole.
+  // `bias`: pull together what has come apart.
   void pass(std::span<MovingBody> bodies, bool bias);
   void store(std::span<ContactRecord> records) const;
 
@@ -84,12 +85,13 @@ class JointSolver {
   std::vector<Cluster> clusters_;
   std::vector<std::uint32_t> order_;  // joints, cluster by cluster
   Skyline matrix_;                    // of all clusters, one after the other
-  std::vector<double> solution_;
+  std::vector<double> solution_, pull_, solution_of_pull_;
   std::vector<std::uint32_t> first_at_, at_;  // the joints at each body
   // Scratch of arrange.
-  std::vector<std::uint32_t> once_, again_, seen_;
+  std::vector<std::uint32_t> once_, again_, first_row_at_;
+  std::vector<std::uint64_t> seen_, seen_body_;
   std::vector<bool> done_;
-  std::uint32_t sight_ = 0;
+  std::uint64_t sight_ = 0;
 };
 
 // Whether what the joint holds is a spring.

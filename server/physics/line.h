@@ -32,4 +32,10 @@ inline void push_along(const Line& line, double impulse, MovingBody& a, MovingBo
   b->w += impulse * line.b_spin;
 }
 
+// How much of an impulse may be applied so that its work is not positive: with impulse s p it is s b + s^2 (w - b).
+inline double allowed(double work, double first_order) {
+  if (work <= 0) return 1;
+  return first_order < 0 ? -first_order / (work - first_order) : 0;
+}
+
 }  // namespace soda::physics

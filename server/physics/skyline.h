@@ -18,8 +18,6 @@ class Skyline {
   // is its own number, and no later row reaches back beyond that.
   void add_row(std::uint32_t first);
   std::uint32_t size() const { return static_cast<std::uint32_t>(rows_.size()); }
-  // How many operations factoring the rows from `begin` on takes, roughly.
-  std::size_t work(std::uint32_t begin) const;
   void cut(std::uint32_t size);                       // takes all rows after the first `size` away
   void zero(std::uint32_t begin, std::uint32_t end);  // all entries of these rows
   // Entry (row, column), with first <= column <= row.

@@ -8,6 +8,7 @@
 #include "server/physics/contact_update.h"
 #include "server/physics/impacts.h"
 #include "server/physics/lanes.h"
+#include "server/physics/line.h"
 #include "server/physics/tuning.h"
 
 namespace soda::physics {
@@ -24,6 +25,16 @@ constexpr double kTouching = 0.005;  // m
 static_assert(offsetof(MovingBody, v) == offsetof(Motion, v) && offsetof(MovingBody, w) == offsetof(Motion, w) &&
               offsetof(MovingBody, moved) == offsetof(Motion, moved) &&
               offsetof(MovingBody, turned) == offsetof(Motion, turned) && alignof(MovingBody) == alignof(Motion));
+
+// J: of two bodies' turning, and of their moving against each other.
+double energy_between(const MovingBody& a, const MovingBody& b) {
+  const auto turning = [](const MovingBody& body) {
+    const Vec3 local = body.q.conjugate() * body.w;
+    return local.dot(body.model->inertia * local);
+  };
+  const double masses = a.inverse_mass + b.inverse_mass;
+  return 0.5 * (turning(a) + turning(b) + (masses > 0 ? (b.v - a.v).squaredNorm() / masses : 0));
+}
 
 }  // namespace
 
@@ -134,6 +145,8 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
     p.separation[lane] = separations[k];
     p.mass[lane] = inverse_or_zero(linear + inverse_mass_of(row, row));
     p.impulse[lane] = impulses[k];
+    p.lever_a[lane] = 0.5 * row.a_turn.norm();
+    if (b) p.lever_b[lane] = 0.5 * row.b_turn.norm();
   }
 
   Vec3 centre_a = Vec3::Zero(), centre_b = Vec3::Zero();
@@ -182,10 +195,19 @@ void IslandSolver::settle_torques(std::span<MovingBody> bodies) const {
     const Batch& batch = batches_[i];
     for (int l = 0; l < kLanes; ++l) {
       if (batch.b[l] == kNoBody) continue;
-      const Vec3 owed = get(batch.owed, l);
       MovingBody &a = bodies[batch.a[l]], &b = bodies[batch.b[l]];
-      a.w -= a.inverse_inertia * (batch.moves_on_a[l] * owed);
-      b.w -= b.inverse_inertia * ((1 - batch.moves_on_a[l]) * owed);
+      const Vec3 of_a = -batch.moves_on_a[l] * get(batch.owed, l),
+                 of_b = (batch.moves_on_a[l] - 1) * get(batch.owed, l);
+      const Vec3 turn_a = a.inverse_inertia * of_a, turn_b = b.inverse_inertia * of_b;
+      // Of small bodies that whirl it would be out of all proportion: what would turn them by much, and make them faster by
+      // more than a little, is left unpaid.
+      const double first_order = of_a.dot(a.w) + of_b.dot(b.w);
+      const double work = first_order + 0.5 * (of_a.dot(turn_a) + of_b.dot(turn_b));
+      const double turn = constants_.dt * std::sqrt(std::max(turn_a.squaredNorm(), turn_b.squaredNorm()));
+      const bool too_much = work > 0 && turn > kOwedTurn && work > kOwedShare * energy_between(a, b);
+      const double kept = too_much ? allowed(work, first_order) : 1;
+      a.w += kept * turn_a;
+      b.w += kept * turn_b;
     }
   }
 }

@@ -34,10 +34,11 @@ struct Row {              // one direction at one place
 
 struct BatchPoint {
   Row row;
-  Lanes mass;        // effective mass along the normal, kg; 0: there is no such point
-  Lanes separation;  // m, at the start of the step
-  Lanes impulse;     // N s, accumulated, of this sub-step
-  Lanes arm;         // m, from the friction centre, for the twist limit
+  Lanes mass;              // effective mass along the normal, kg; 0: there is no such point
+  Lanes separation;        // m, at the start of the step
+  Lanes impulse;           // N s, accumulated, of this sub-step
+  Lanes arm;               // m, from the friction centre, for the twist limit
+  Lanes lever_a, lever_b;  // m: half the lengths of the angular Jacobians
 };
 
 // Up to four contacts that share no moving body. Lanes that are not in use are all zero, and stay so.

@@ -28,8 +28,11 @@ constexpr double kContactHertzCap = 1000;              // Hz
 constexpr double kContactDampingRatio = 10;
 constexpr double kStaticHertzFactor = 2;      // contacts with static bodies are stiffer ...
 constexpr double kStaticDampingFactor = 0.5;  // ... and less damped
+constexpr double kTurnedFar = 0.2;            // rad; from there on it is not certain what still overlaps
 constexpr double kPushOutSpeed = 3;           // m/s, limit for removing penetration
 constexpr double kMovingSpeed = 0.01;         // m/s; faster against each other, angular momentum is kept to the last
+constexpr double kOwedTurn = 0.05;              // rad per step, by which paying back may always turn a body
+constexpr double kOwedShare = 0.1;            // of two bodies' energy, that paying angular momentum back may cost
 constexpr double kRestitutionThreshold = 1;   // m/s; slower approaches do not bounce
 constexpr double kImpactReach = 1.001;  // of what is covered in a sub-step: whoever just touches at its end strikes
 constexpr int kImpactIterations = 16;   // over the points of one manifold
@@ -50,7 +53,10 @@ constexpr double kMostSubstepsForTravel = 8;
 constexpr double kJointHertzPerSubstepRate = 0.25;
 constexpr double kDirectHertzPerSubstepRate = 0.5;  // of joints that are solved as a whole; iterated ones would explode
 constexpr double kJointDampingRatio = 2;
-constexpr std::size_t kMostDirectWork = 200'000;  // operations; joints whose direct solution takes more are iterated
+// Operations; joints whose direct solution takes more than both are iterated. A chain takes about 40 per row.
+constexpr std::size_t kMostDirectWork = 200'000, kMostDirectWorkPerRow = 1000;
+constexpr double kPullTogetherSpeed =
+    3;  // m/s, of all bodies of a cluster: as fast as its joints may pull them together
 
 // ---- integration
 constexpr double kGyroscopicAngle = 1e-3;  // rad per sub-step; slower spinning is taken as free of gyroscopic torque

@@ -48,7 +48,7 @@ Timeline::Timeline(const physics::Model& model, WorldId me, std::size_t sources,
   first.islands = Table<Island>(model.bodies().size());
   first.heard.assign(sources, Ref(new NearSet));
   for (const BodyState& body : model.initial_state().bodies) {
-    const Place place = arbiter_.place(body);
+    const Place place = arbiter_.place(body, 0);
     if (place.owner == me_) results_.emplace_back(slot_of(body.id), make_record(body, {}, place, 0));
   }
   store(0, results_);
@@ -57,13 +57,13 @@ Timeline::Timeline(const physics::Model& model, WorldId me, std::size_t sources,
 
 Slot Timeline::slot_of(BodyId id) const { return static_cast<Slot>(model_.find(id) - model_.bodies().data()); }
 
-Ref<NearSet> Timeline::near_set(const BodySet& set) const {
+Ref<NearSet> Timeline::near_set(const BodySet& set, Step step) const {
   Ref<NearSet> near(new NearSet);
   near->bodies.reserve(set.bodies.size());
   std::span<const ContactRecord> rest(set.contacts);
   for (const BodyState& body : set.bodies)
     near->bodies.push_back(
-        {slot_of(body.id), make_record(body, take_contacts(rest, body.id), arbiter_.place(body), -1)});
+        {slot_of(body.id), make_record(body, take_contacts(rest, body.id), arbiter_.place(body, step), -1)});
   return near;
 }
 
@@ -119,7 +119,7 @@ void Timeline::assume(std::size_t source, Step step) {
   for (; step <= newest(); ++step) {
     Entry& entry = at(step);
     const auto told = told_[source].find(step);
-    Ref<NearSet> now = told != told_[source].end() ? told->second : sleepers(at(step - 1).heard[source]);
+    Ref<NearSet> now = told != told_[source].end() ? told->second : moved(sleepers(at(step - 1).heard[source]), step);
     Ref<NearSet>& known = entry.heard[source];
     if (now == known || same(*now, *known)) return;
     auto o = known->bodies.begin();
@@ -143,6 +143,7 @@ void Timeline::extend() {
   Entry next{last.produced, last.islands, last.heard, {}, {}, last.departed, {}, last.count, last.hash};
   entries_.push_back(std::move(next));
   ++stats_.steps;
+  if (arbiter_.places_change(newest())) change_hands(newest());
   for (std::size_t source = 0; source < told_.size(); ++source) {
     assume(source, newest());
     if (const auto told = told_[source].find(newest()); told != told_[source].end())
@@ -154,6 +155,37 @@ void Timeline::extend() {
   arbiter_.extended(newest());
   // What nothing pending touches has its result already.
   for (const Slot slot : effects_.acted_on(newest())) do_actions(newest(), slot);
+}
+
+// The same body where space has changed hands about it.
+Ref<Record> Timeline::moved(const Record& record, Step step) const {
+  return make_record(record.body, record.contacts(), arbiter_.place(record.body, step), record.computed);
+}
+
+Ref<NearSet> Timeline::moved(Ref<NearSet> set, Step step) const {
+  if (!arbiter_.places_change(step)) return set;
+  Ref<NearSet> now(new NearSet);
+  for (const NearSet::Body& b : set->bodies)
+    now->bodies.push_back({b.slot, arbiter_.place_changes(b.record->body, step) ? moved(*b.record, step) : b.record});
+  return now;
+}
+
+// The newest entry is a copy of the one before, but bodies may be others' to do from here on, and islands mixed that
+// were not. Who hears of which must be looked at again, too.
+void Timeline::change_hands(Step step) {
+  Entry& entry = at(step);
+  results_.clear();
+  entry.produced.for_each([&](Slot slot, const Ref<Record>& record) {
+    if (!arbiter_.place_changes(record->body, step)) return;
+    results_.emplace_back(slot, moved(*record, step));
+    stats_.handed_over += own(*record) && !own(*results_.back().second);
+  });
+  store(step, results_);
+  for (Ref<NearSet>& heard : entry.heard) {
+    heard = moved(heard, step);
+    for (const NearSet::Body& b : heard->bodies)
+      if (arbiter_.place_changes(b.record->body, step)) entry.pending.push_back(b.slot);
+  }
 }
 
 bool Timeline::is_large(Slot slot, const BodyState& body) const {
@@ -220,10 +252,10 @@ Ref<Record> Timeline::after_actions(Step step, Slot slot, const Record* raw) con
   std::optional<BodyState> state;
   const bool given = effects_.gives(step, slot, state);
   if (!given && raw) state = raw->body;
-  if (!state || (given && arbiter_.place(*state).owner != me_)) return {};
+  if (!state || (given && arbiter_.place(*state, step).owner != me_)) return {};
   effects_.apply(step, slot, *state);
-  if (given) return make_record(*state, {}, arbiter_.place(*state), step);
-  return make_record(*state, raw->contacts(), arbiter_.place(*state), raw->computed);
+  if (given) return make_record(*state, {}, arbiter_.place(*state, step), step);
+  return make_record(*state, raw->contacts(), arbiter_.place(*state, step), raw->computed);
 }
 
 // Does what is done to a body at a step again, with the result that is known.
@@ -296,14 +328,14 @@ void Timeline::take_result(Step step, Slot slot, const BodyState& body, std::spa
   if (old && same(*old, body, contacts))
     note_repaired(slot, body, step);  // healed, or at rest
   else
-    results_.emplace_back(slot, make_record(body, contacts, arbiter_.place(body), step));
+    results_.emplace_back(slot, make_record(body, contacts, arbiter_.place(body, step), step));
 }
 
 void Timeline::take_acted(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts) {
   Entry& entry = at(step);
   Ref<Record>& raw = entry.raw[slot];
   if (raw && same(*raw, body, contacts)) return;  // healed
-  raw = make_record(body, contacts, arbiter_.place(body), step);
+  raw = make_record(body, contacts, arbiter_.place(body, step), step);
   const Record* const before = entry.produced.get(slot);
   Ref<Record> now = after_actions(step, slot, raw.get());
   if (!now)

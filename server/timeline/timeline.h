@@ -19,12 +19,12 @@
 #include <vector>
 
 #include "common/body_set.h"
+#include "common/table.h"
 #include "server/physics/stepper.h"
 #include "server/timeline/effects.h"
 #include "server/timeline/marks.h"
 #include "server/timeline/record.h"
 #include "server/timeline/spatial_index.h"
-#include "common/table.h"
 
 namespace soda::timeline {
 
@@ -63,7 +63,10 @@ struct Found {
 class Arbiter {
  public:
   virtual ~Arbiter() = default;
-  virtual Place place(const BodyState& body) const = 0;
+  virtual Place place(const BodyState& body, Step step) const = 0;
+  // Whether space changes hands at `step`; and then, whether that can matter to whoever has to do with a body.
+  virtual bool places_change(Step step) const = 0;
+  virtual bool place_changes(const BodyState& body, Step step) const = 0;
   // Entry `step` has been made, as a copy of the one before.
   virtual void extended(Step step) = 0;
   // A new round of finding islands at `step` begins; `all`: no island found there before stands. Returns whether any
@@ -78,11 +81,12 @@ class Arbiter {
 };
 
 struct TimelineStats {
-  std::uint64_t steps = 0;             // entries advanced to
-  std::uint64_t bodies_computed = 0;   // results computed, first or again
-  std::uint64_t bodies_redone = 0;     // results that replaced those of a step that had been there, also of bodies at rest
-  std::uint64_t steps_redone = 0;      // rounds in which there were any
+  std::uint64_t steps = 0;            // entries advanced to
+  std::uint64_t bodies_computed = 0;  // results computed, first or again
+  std::uint64_t bodies_redone = 0;  // results that replaced those of a step that had been there, also of bodies at rest
+  std::uint64_t steps_redone = 0;   // rounds in which there were any
   std::uint64_t longest_rollback = 0;  // steps from a change to the clock, at most
+  std::uint64_t handed_over = 0;       // bodies that became others' because space changed hands
 };
 
 class Timeline {
@@ -95,7 +99,7 @@ class Timeline {
 
   // `source` produced these bodies at `step`, and no others that matter here. For steps to come, too.
   void hear(std::size_t source, Step step, Ref<NearSet> set);
-  Ref<NearSet> near_set(const BodySet& set) const;  // of bodies received
+  Ref<NearSet> near_set(const BodySet& set, Step step) const;  // of bodies received
   const Ref<NearSet>& heard(std::size_t source, Step step) const { return at(step).heard[source]; }
 
   // The next entry of the action log: changes what has been computed of its step and, of what lasts, of later ones. The
@@ -173,6 +177,9 @@ class Timeline {
   Entry& at(Step step) { return entries_.at(static_cast<std::size_t>(step - base_)); }
   const Entry& at(Step step) const { return entries_.at(static_cast<std::size_t>(step - base_)); }
   void extend();
+  Ref<Record> moved(const Record& record, Step step) const;
+  Ref<NearSet> moved(Ref<NearSet> set, Step step) const;
+  void change_hands(Step step);
   void assume(std::size_t source, Step step);
   bool is_large(Slot slot, const BodyState& body) const;
   void note(Slot slot, const BodyState& body);

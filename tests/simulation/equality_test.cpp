@@ -96,6 +96,26 @@ std::string any_name(const testing::TestParamInfo<std::tuple<std::string, int>>&
 const auto kAnyScenes = testing::Values("cubes", "city", "cluster", "wide_bodies", "fast_bodies", "corner");
 INSTANTIATE_TEST_SUITE_P(Sample, AnyTerritories, testing::Combine(kAnyScenes, testing::Range(2, 4)), any_name);
 
+// Cells change hands at random steps, with whatever is in them: asleep, in flight, in islands of several worlds.
+class Transfers : public testing::TestWithParam<std::tuple<std::string, int>> {};
+
+TEST_P(Transfers, SameBitsAsOneWorld) {
+  const auto& [name, seed] = GetParam();
+  const Reference& expected = reference(name);
+  const HardScene& hard = hard_scene(name);
+  const WorldId worlds = 2 + static_cast<WorldId>(seed % 4);
+  const auto number = static_cast<std::uint64_t>(seed);
+  const std::vector<WorldId> owner = seed % 2 ? std::vector<WorldId>() : slabs(expected.scene, worlds);
+  const auto transfers = random_transfers(expected.scene, worlds, owner, hard.steps, number);
+  ASSERT_FALSE(transfers.empty());
+  const SessionResult got = run_session(expected.scene, worlds, hard.steps, network_of(number), owner, {}, transfers);
+  expect_equal(expected, got, hard.steps);
+  EXPECT_GT(got.total.timeline.handed_over, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sample, Transfers, testing::Combine(testing::ValuesIn(scene_names()), testing::Range(21, 24)),
+                         any_name);
+
 TEST(WideBodies, AreToldToEveryWorldTheyReach) {
   const Reference& expected = reference("wide_bodies");
   const SessionResult got = run_session(expected.scene, 8, 150, {});

@@ -1,5 +1,6 @@
 #include "tests/simulation/scenario.h"
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <random>
@@ -56,6 +57,32 @@ std::vector<WorldId> confetti(const Scene& scene, WorldId worlds, std::uint64_t 
   return owner;
 }
 
+std::vector<border::Transfer> random_transfers(const Scene& scene, WorldId worlds, const std::vector<WorldId>& owner,
+                                               Step steps, std::uint64_t seed) {
+  std::mt19937_64 random(seed * 15485863 + 3);
+  std::vector<WorldId> now = owner.empty() ? bisect(scene, make_grid(scene), worlds).owner : owner;
+  std::vector<std::uint32_t> numbers(worlds, 0);
+  std::vector<border::Transfer> transfers;
+  const auto count = 1 + random() % 8;
+  std::vector<Step> when;
+  for (std::uint64_t i = 0; i < count; ++i)
+    when.push_back(1 + static_cast<Step>(random() % static_cast<std::uint64_t>(steps)));
+  std::sort(when.begin(), when.end());
+  for (const Step step : when) {
+    border::Transfer t;
+    t.step = step;
+    t.giver = now[random() % now.size()];
+    t.taker = (t.giver + 1 + static_cast<WorldId>(random() % (worlds - 1))) % worlds;
+    t.number = ++numbers[t.giver];
+    const auto share = std::vector<std::uint64_t>{1, 2, 10}[random() % 3];  // one in so many of the giver's cells
+    for (std::uint32_t cell = 0; cell < now.size(); ++cell)
+      if (now[cell] == t.giver && random() % share == 0) t.cells.push_back(cell);
+    for (const std::uint32_t cell : t.cells) now[cell] = t.taker;
+    if (!t.cells.empty()) transfers.push_back(t);
+  }
+  return transfers;
+}
+
 Scenario scenario_of(std::uint64_t seed) {
   std::mt19937_64 random(seed * 104729 + 1);
   // Machines came later; other seeds keep the meaning that they had, for tests name some.
@@ -83,6 +110,7 @@ Scenario scenario_of(std::uint64_t seed) {
   // A third without any; half of the others as they come, half as a file has them.
   if (const auto kind = random() % 6; kind >= 2)
     s.actions = random_actions(scene, s.steps, 1 + random() % 12, kind >= 4, seed);
+  if (seed % 2 == 0) s.transfers = random_transfers(scene, s.worlds, s.owner, s.steps, seed);
   return s;
 }
 
@@ -93,12 +121,13 @@ std::string Scenario::text() const {
          ", delay " + std::to_string(network.delay) + ", slow " + share(network.slow_share) + ", doubled " +
          share(network.double_share) + ", lost " + share(network.loss_share) + ", stalled " +
          share(network.stall_share) + ", touched " + share(network.touch_share) + ", lead " +
-         std::to_string(network.lead) + ", " + std::to_string(actions.size()) + " actions";
+         std::to_string(network.lead) + ", " + std::to_string(actions.size()) + " actions, " +
+         std::to_string(transfers.size()) + " transfers";
 }
 
 SessionResult run_scenario(const Scenario& s) {
   const Reference& expected = reference(s.scene);
-  SessionResult got = run_session(expected.scene, s.worlds, s.steps, s.network, s.owner, s.actions);
+  SessionResult got = run_session(expected.scene, s.worlds, s.steps, s.network, s.owner, s.actions, s.transfers);
   if (!got.failure.empty()) return got;
   const auto end = expected.steps.begin() + s.steps + 1;
   got.failure = first_difference(s.actions.empty() ? std::vector<StepDigest>(expected.steps.begin(), end)

@@ -24,6 +24,10 @@ std::vector<WorldId> slabs(const Scene& scene, WorldId worlds);
 // Any cell to anybody: territories that are not even connected, and everybody has something.
 std::vector<WorldId> confetti(const Scene& scene, WorldId worlds, std::uint64_t seed);
 
+// Cells that change hands at random steps, a few or many at a time, from anybody to anybody.
+std::vector<border::Transfer> random_transfers(const Scene& scene, WorldId worlds, const std::vector<WorldId>& owner,
+                                               Step steps, std::uint64_t seed);
+
 struct Scenario {
   std::string scene;  // of hard_scenes()
   WorldId worlds = 2;
@@ -31,6 +35,7 @@ struct Scenario {
   std::vector<WorldId> owner;  // territories; empty: those that a session would have
   NetworkSettings network;
   Actions actions;
+  std::vector<border::Transfer> transfers;
   std::string text() const;  // for people
 };
 Scenario scenario_of(std::uint64_t seed);

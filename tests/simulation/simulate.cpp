@@ -84,6 +84,7 @@ int main(int argc, char** argv) {
       {"messages that came before an action", s.held_back},
       {"islands mixed", s.mixed_islands},
       {"bodies that changed worlds", s.arrived},
+      {"bodies handed over with their cells", s.timeline.handed_over},
       {"wide bodies told", s.wide_bodies},
   };
   bool all = true;

@@ -106,7 +106,7 @@ class Service {
 class Session {
  public:
   Session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
-          const std::vector<WorldId>& owner, const Actions& log)
+          const std::vector<WorldId>& owner, const Actions& log, const std::vector<border::Transfer>& transfers)
       : scene_(scene),
         network_(network),
         random_(network.seed),
@@ -124,6 +124,7 @@ class Session {
                                                                                 .last_step = steps,
                                                                                 .sync = network.sync,
                                                                                 .window = network.window,
+                                                                                .transfers = transfers,
                                                                                 .actions = true},
                                                            digests_[w]));
       slowness_[w] = uniform() * network.stall_share;
@@ -282,6 +283,7 @@ void add(border::CoreStats& sum, const border::CoreStats& s) {
   sum.timeline.bodies_computed += s.timeline.bodies_computed;
   sum.timeline.bodies_redone += s.timeline.bodies_redone;
   sum.timeline.steps_redone += s.timeline.steps_redone;
+  sum.timeline.handed_over += s.timeline.handed_over;
   sum.timeline.longest_rollback = std::max(sum.timeline.longest_rollback, s.timeline.longest_rollback);
 }
 
@@ -333,8 +335,9 @@ std::vector<StepDigest> run_single(const Scene& scene, Step steps, const Actions
 }
 
 SessionResult run_session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
-                          const std::vector<WorldId>& owner, const Actions& log) {
-  return Session(scene, worlds, steps, network, owner, log).run();
+                          const std::vector<WorldId>& owner, const Actions& log,
+                          const std::vector<border::Transfer>& transfers) {
+  return Session(scene, worlds, steps, network, owner, log, transfers).run();
 }
 
 std::string first_difference(const std::vector<StepDigest>& expected, const std::vector<StepDigest>& got) {

@@ -49,9 +49,11 @@ using Actions = std::vector<LoggedAction>;
 std::vector<StepDigest> run_single(const Scene& scene, Step steps, const Actions& log = {});
 
 // The session on `worlds` worlds. `owner` overrides the territories (by Grid::index) where not empty. Actions come
-// while it runs where their log is in the order of their steps, else all at the start.
+// while it runs where their log is in the order of their steps, else all at the start. All worlds know of `transfers`
+// of cells from the start.
 SessionResult run_session(const Scene& scene, WorldId worlds, Step steps, const NetworkSettings& network,
-                          const std::vector<WorldId>& owner = {}, const Actions& log = {});
+                          const std::vector<WorldId>& owner = {}, const Actions& log = {},
+                          const std::vector<border::Transfer>& transfers = {});
 
 // "step 17: ..." for the first step that differs, empty where none does.
 std::string first_difference(const std::vector<StepDigest>& expected, const std::vector<StepDigest>& got);

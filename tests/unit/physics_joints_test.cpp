@@ -298,6 +298,44 @@ TEST(Joint, AClosedRingOfHingesStaysClosed) {
   EXPECT_EQ(world.stepper.shares.joints_alone, 0u);
 }
 
+// Something as light as dust between the world and what is heavy: its rows look as if others implied them.
+TEST(Joint, ADummyLinkCarriesWhatHangsOnIt) {
+  SceneBuilder builder = awake("dummy");
+  Body& dummy = builder.add(Sphere{0.0016}, Vec3::Zero());
+  dummy.inertial.mass = 1e-3;
+  dummy.inertial.inertia = 1e-9 * Mat3::Identity();
+  builder.add(Box{Vec3(0.4, 0.4, 0.4)}, Vec3(0.3, 0, -0.3), Quat::Identity(), 100 / 0.064);
+  builder.add_joint(JointKind::kFixed, 0, SceneBuilder::kWorld, Vec3::Zero());
+  Joint& ball = builder.add_joint(JointKind::kBall, 0, 1, Vec3(0.3, 0, 0));
+  ball.bodies_collide = false;
+  World world(builder);
+  world.run(2);
+  EXPECT_LT(world.gap(1), 2e-3);
+  EXPECT_NEAR(world.at(1).position[2], -0.3, 5e-3);
+}
+
+// As files have them, rounded: one pin is not quite parallel to the others, and one corner not quite closed.
+TEST(Joint, ARingThatDoesNotQuiteCloseIsNotKicked) {
+  for (const double misfit : {1e-5, 1e-4, 1e-3}) {
+    SceneBuilder builder = awake("rounded ring");
+    builder.scene.gravity = Vec3::Zero();
+    const Vec3 places[4] = {{0.5, 0, 0}, {1, 0, 0.5}, {0.5, 0, 1}, {0, 0, 0.5}};
+    for (int i = 0; i < 4; ++i) builder.add(i % 2 ? Box{Vec3(0.1, 0.1, 0.9)} : Box{Vec3(0.9, 0.1, 0.1)}, places[i]);
+    const Vec3 corners[4] = {{1, 0, 0}, {1, 0, 1}, {0, 0, 1}, {0, 0, 0}};
+    for (int i = 0; i < 4; ++i)
+      builder.add_joint(JointKind::kHinge, i, (i + 1) % 4, corners[i], i == 2 ? Vec3(1e-3, 1, 0) : Vec3::UnitY());
+    builder.scene.joints[1].frame_a.position.y() += misfit;
+    World world(builder);
+    double fastest = 0;
+    for (int i = 0; i < 120; ++i) {
+      world.stepper.step(world.set);
+      for (const BodyState& body : world.set.bodies) fastest = std::max(fastest, body.v().norm());
+    }
+    EXPECT_LT(fastest, 0.5) << misfit;
+    for (std::size_t j = 0; j < 4; ++j) EXPECT_LT(world.gap(j), 2 * misfit + 1e-5) << misfit;
+  }
+}
+
 TEST(Joint, AMeshOfTooManyJointsIsIterated) {
   SceneBuilder builder = awake("cloth");
   constexpr int kEdge = 24;

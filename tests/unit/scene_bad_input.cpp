@@ -131,7 +131,7 @@ const BadInput kBad[] = {
     {"ZeroStep", "\ndt: 0 " BODY(BOX), "", "dt", "is 0"},
     {"NegativeStep", "\ndt: -0.1 " BODY(BOX), "", "dt", "is -0.1"},
     {"NoSubsteps", "\nmodel { substeps: 0 } " BODY(BOX), "", "model.substeps", "is 0"},
-    {"TooManySubsteps", "\nmodel { substeps: 2000 } " BODY(BOX), "", "model.substeps", "is 2000"},
+    {"TooManySubsteps", "\nmodel { substeps: 65 } " BODY(BOX), "", "model.substeps", "is 65"},
     {"NoSuchJointMethod", "model {\n joints: GUESSED }", "", "", "GUESSED"},
     {"NegativeCell", "\nterritory_cell: -1 " BODY(BOX), "", "territory_cell", "is -1"},
     {"ZeroMaxSpeed", "\nmax_speed: 0 " BODY(BOX), "", "max_speed", "is 0"},

@@ -371,6 +371,8 @@ TEST(SceneBadJointMore, ValidateChecksScenesMadeInMemory) {
   EXPECT_EQ(field_of([](Scene& s) { s.joints[6].limits.reset(); }), "joint[6] \"rod\".distance.limits");
   EXPECT_EQ(field_of([](Scene& s) { s.joints[0].frame_a.orientation.coeffs() *= 2; }), "joint[0].frame_a.orientation");
   EXPECT_EQ(field_of([](Scene& s) { s.joints[0].kind = static_cast<JointKind>(9); }), "joint[0]");
+  EXPECT_EQ(field_of([](Scene& s) { s.joints[8].frame_b.orientation = s.joints[8].frame_a.orientation; }),
+            "joint[8] \"cardan\".universal");
 }
 
 }  // namespace

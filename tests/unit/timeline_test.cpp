@@ -107,7 +107,9 @@ TEST(SpatialIndex, KeepsBothPlacesOfABodyThatTwoTellOf) {
 class HalfSpace : public Arbiter {
  public:
   explicit HalfSpace(double border) : border_(border) {}
-  Place place(const BodyState& body) const override { return {body.x().x() < border_ ? 0u : 1u, false, false}; }
+  Place place(const BodyState& body, Step) const override { return {body.x().x() < border_ ? 0u : 1u, false, false}; }
+  bool places_change(Step) const override { return false; }
+  bool place_changes(const BodyState&, Step) const override { return false; }
   void extended(Step) override {}
   bool finding(Step, bool) override { return false; }
   void dropped(Step, const Island&) override { ++drops; }
@@ -248,7 +250,7 @@ TEST(Timeline, AChangeDoesAgainWhatItTouchesAndNothingElse) {
     if (timeline.slot_of(body.id) == stranger_slot) set.bodies.push_back(body);
   ASSERT_EQ(set.bodies.size(), 1u);
   // At step 10 it is close to the first group.
-  timeline.hear(0, 10, timeline.near_set(set));
+  timeline.hear(0, 10, timeline.near_set(set, 10));
   EXPECT_TRUE(timeline.has_pending(10));
   EXPECT_FALSE(timeline.has_pending(11));  // it is awake, so it is gone there, as before
   EXPECT_FALSE(timeline.has_pending(9));
@@ -303,7 +305,7 @@ TEST(Timeline, WhatSleepsIsAssumedToStayAndWhatIsAwakeToBeGone) {
     if (body.x().x() > 0) set.bodies.push_back(body);
   ASSERT_EQ(set.bodies.size(), 2u);
   set.bodies[0].flags |= kAsleep;
-  timeline.hear(0, 3, timeline.near_set(set));
+  timeline.hear(0, 3, timeline.near_set(set, 3));
   advance(timeline, 6);
   EXPECT_EQ(timeline.known(2, 1), nullptr);
   EXPECT_NE(timeline.known(3, 1), nullptr);

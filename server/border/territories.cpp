@@ -1,0 +1,119 @@
+#include "server/border/territories.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <tuple>
+
+namespace soda::border {
+namespace {
+
+// The cells within `range` of a marked one along each axis: dilating along each axis in turn gives the cube.
+void dilate(const Grid& grid, int range, std::vector<std::uint8_t>& marked) {
+  const std::size_t stride[3] = {1, static_cast<std::size_t>(grid.size[0]),
+                                 static_cast<std::size_t>(grid.size[0]) * grid.size[1]};
+  std::vector<std::uint8_t> line;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t n = grid.size[axis];
+    for (std::size_t i = 0; i < marked.size(); ++i) {
+      if (i / stride[axis] % n != 0) continue;  // first cell of a line along the axis
+      line.assign(n, 0);
+      for (std::int32_t k = 0; k < n; ++k)
+        if (marked[i + k * stride[axis]])
+          for (std::int32_t d = std::max(0, k - range); d <= std::min(n - 1, k + range); ++d) line[d] = 1;
+      for (std::int32_t k = 0; k < n; ++k) marked[i + k * stride[axis]] = line[k];
+    }
+  }
+}
+
+bool earlier(const Transfer& l, const Transfer& r) {
+  return std::tie(l.step, l.giver, l.number) < std::tie(r.step, r.giver, r.number);
+}
+
+}  // namespace
+
+Territories::Territories(const TerritoryMap& initial) : grid_(initial.grid), worlds_(initial.worlds) {
+  Version& first = versions_.emplace_back();
+  first.owner = initial.owner;
+  first.sole.resize(first.owner.size());
+  make_sole(first, {});
+}
+
+const Territories::Version& Territories::at(Step step) const {
+  auto version = versions_.end();
+  do --version;
+  while (version->from > step && version != versions_.begin());
+  return *version;
+}
+
+bool Territories::knows(WorldId giver, std::uint32_t number) const {
+  return std::any_of(transfers_.begin(), transfers_.end(),
+                     [&](const Transfer& t) { return t.giver == giver && t.number == number; });
+}
+
+bool Territories::add(const Transfer& transfer) {
+  if (knows(transfer.giver, transfer.number)) return false;
+  if (transfer.step <= 0) throw std::invalid_argument("a transfer begins at a step after the first");
+  transfers_.insert(std::upper_bound(transfers_.begin(), transfers_.end(), transfer, earlier), transfer);
+  rebuild_from(transfer.step);
+  return true;
+}
+
+// Makes the versions from this step on anew.
+void Territories::rebuild_from(Step step) {
+  std::erase_if(versions_, [&](const Version& v) { return v.from >= step && v.from > 0; });
+  for (std::size_t i = 0; i < transfers_.size();) {
+    const Step from = transfers_[i].step;
+    std::size_t end = i;
+    while (end < transfers_.size() && transfers_[end].step == from) ++end;
+    if (from >= step) {
+      Version next = versions_.back();
+      next.from = from;
+      next.near_changed.assign(grid_.cells(), 0);
+      for (; i < end; ++i)
+        for (const std::uint32_t cell : transfers_[i].cells) {
+          next.owner.at(cell) = transfers_[i].taker;
+          next.near_changed[cell] = 1;
+        }
+      dilate(grid_, 2, next.near_changed);
+      make_sole(next, next.near_changed);
+      versions_.push_back(std::move(next));
+    }
+    i = end;
+  }
+}
+
+// Of the cells that are marked, or of all where nothing is.
+void Territories::make_sole(Version& version, const std::vector<std::uint8_t>& where) const {
+  for (std::int32_t z = 0; z < grid_.size[2]; ++z)
+    for (std::int32_t y = 0; y < grid_.size[1]; ++y)
+      for (std::int32_t x = 0; x < grid_.size[0]; ++x) {
+        const std::size_t cell = grid_.index({x, y, z});
+        if (!where.empty() && !where[cell]) continue;
+        const WorldId owner = version.owner[cell];
+        bool sole = true;
+        for (std::int32_t k = std::max(0, z - 1); sole && k <= std::min(grid_.size[2] - 1, z + 1); ++k)
+          for (std::int32_t j = std::max(0, y - 1); sole && j <= std::min(grid_.size[1] - 1, y + 1); ++j)
+            for (std::int32_t i = std::max(0, x - 1); sole && i <= std::min(grid_.size[0] - 1, x + 1); ++i)
+              sole = version.owner[grid_.index({i, j, k})] == owner;
+        version.sole[cell] = sole ? owner : kNoWorld;
+      }
+}
+
+std::size_t Territories::cells_of(WorldId world, Step step) const {
+  const auto& owner = at(step).owner;
+  return static_cast<std::size_t>(std::count(owner.begin(), owner.end(), world));
+}
+
+void Territories::mark_neighbours(WorldId world, int range, std::vector<std::uint8_t>& marked) const {
+  marked.resize(worlds_, 0);
+  std::vector<std::uint8_t> near;
+  for (const Version& version : versions_) {
+    near.assign(grid_.cells(), 0);
+    for (std::size_t i = 0; i < near.size(); ++i) near[i] = version.owner[i] == world;
+    dilate(grid_, range, near);
+    for (std::size_t i = 0; i < near.size(); ++i)
+      if (near[i]) marked[version.owner[i]] = 1;
+  }
+}
+
+}  // namespace soda::border
