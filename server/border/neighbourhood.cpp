@@ -52,9 +52,16 @@ timeline::Place Neighbourhood::place(const BodyState& body, Step step) const {
   const std::size_t cell = cell_of(body);
   timeline::Place place;
   place.owner = territories_.owner(cell, step);
-  place.wide = is_wide(body);
+  place.wide = is_wide(body) && (place.owner == me_ || reaches_me(body, step));
   place.inside = !place.wide && territories_.sole(cell, step) != kNoWorld;
   return place;
+}
+
+// Of what has been given away with its cell, it may not be so.
+bool Neighbourhood::reaches_me(const BodyState& body, Step step) const {
+  std::vector<WorldId> worlds;
+  reached_by_box(body, step, worlds);
+  return std::find(worlds.begin(), worlds.end(), me_) != worlds.end();
 }
 
 bool Neighbourhood::place_changes(const BodyState& body, Step step) const {

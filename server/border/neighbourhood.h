@@ -41,6 +41,7 @@ class Neighbourhood {
 
  private:
   std::size_t cell_of(const BodyState& body) const;
+  bool reaches_me(const BodyState& body, Step step) const;
   void reached_by_box(const BodyState& body, Step step, std::vector<WorldId>& worlds) const;
   const physics::Model& model_;
   const Territories& territories_;

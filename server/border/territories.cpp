@@ -106,13 +106,15 @@ std::size_t Territories::cells_of(WorldId world, Step step) const {
 
 void Territories::mark_neighbours(WorldId world, int range, std::vector<std::uint8_t>& marked) const {
   marked.resize(worlds_, 0);
+  // Who gives cells away tells their new owner of what is in them, wherever else that one is.
   std::vector<std::uint8_t> near;
-  for (const Version& version : versions_) {
+  for (std::size_t v = 0; v < versions_.size(); ++v) {
+    const auto &now = versions_[v].owner, &before = versions_[v == 0 ? 0 : v - 1].owner;
     near.assign(grid_.cells(), 0);
-    for (std::size_t i = 0; i < near.size(); ++i) near[i] = version.owner[i] == world;
+    for (std::size_t i = 0; i < near.size(); ++i) near[i] = now[i] == world || before[i] == world;
     dilate(grid_, range, near);
     for (std::size_t i = 0; i < near.size(); ++i)
-      if (near[i]) marked[version.owner[i]] = 1;
+      if (near[i]) marked[now[i]] = marked[before[i]] = 1;
   }
 }
 

@@ -41,7 +41,8 @@ class Territories {
   bool change_at(Step step) const { return at(step).from == step && step > 0; }
   bool changes_near(std::size_t cell, Step step) const { return change_at(step) && at(step).near_changed[cell]; }
 
-  // Marks worlds that own cells, at any step that is known of, within `range` cells of one that `world` owns then.
+  // Marks worlds that own cells, at any step that is known of, within `range` cells of one that `world` owns then; or
+  // owned either at the step before.
   void mark_neighbours(WorldId world, int range, std::vector<std::uint8_t>& marked) const;
 
  private:

@@ -33,8 +33,8 @@ struct CoreSettings {
                               // messages are refused
   Step last_step = 0;         // the run ends when this step is final
   Sync sync = Sync::kAnticipative;
-  Step window = 48;                 // K: steps beyond the final one that may be computed
-  bool measure = false;             // keep the CPU time of CoreStats::shares
+  Step window = 48;                      // K: steps beyond the final one that may be computed
+  bool measure = false;                  // keep the CPU time of CoreStats::shares
   std::vector<Transfer> transfers = {};  // of cells, that all worlds know of from the start
   bool actions = false;  // no step becomes final before close_actions() has said that nothing will be done at it
 };

@@ -15,7 +15,7 @@ namespace soda::timeline {
 // Where a body is, as those see it who divide space among worlds: a function of its state alone.
 struct Place {
   WorldId owner = 0;
-  bool wide = false;    // its reach box reaches more than half a cell from its centre along an axis
+  bool wide = false;    // its reach box reaches more than half a cell from its centre along an axis, and this world
   bool inside = false;  // nobody but its owner can have anything to do with it
 };
 

@@ -60,7 +60,8 @@ std::vector<WorldId> confetti(const Scene& scene, WorldId worlds, std::uint64_t 
 std::vector<border::Transfer> random_transfers(const Scene& scene, WorldId worlds, const std::vector<WorldId>& owner,
                                                Step steps, std::uint64_t seed) {
   std::mt19937_64 random(seed * 15485863 + 3);
-  std::vector<WorldId> now = owner.empty() ? bisect(scene, make_grid(scene), worlds).owner : owner;
+  const Grid grid = make_grid(scene);
+  std::vector<WorldId> now = owner.empty() ? bisect(scene, grid, worlds).owner : owner;
   std::vector<std::uint32_t> numbers(worlds, 0);
   std::vector<border::Transfer> transfers;
   const auto count = 1 + random() % 8;
@@ -71,7 +72,9 @@ std::vector<border::Transfer> random_transfers(const Scene& scene, WorldId world
   for (const Step step : when) {
     border::Transfer t;
     t.step = step;
-    t.giver = now[random() % now.size()];
+    // Where bodies are, at first.
+    const Body& body = scene.bodies[random() % scene.bodies.size()];
+    t.giver = now[grid.index(grid.cell_of(body.pose.position))];
     t.taker = (t.giver + 1 + static_cast<WorldId>(random() % (worlds - 1))) % worlds;
     t.number = ++numbers[t.giver];
     const auto share = std::vector<std::uint64_t>{1, 2, 10}[random() % 3];  // one in so many of the giver's cells
