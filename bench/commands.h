@@ -13,4 +13,8 @@ void viewer(const Options& options, Headline& headline);    // what watching cos
 void latency(const Options& options, Headline& headline);   // what users notice
 void accuracy(const Options& options, Headline& headline);  // errors against cost, beside stock Bullet
 
+void sync_groups(const Options& options, Headline& headline);  // worlds that hang together, by the number of bodies
+void granularity(const Options& options, Headline& headline);  // the same, by the number of worlds
+void resilience(const Options& options, Headline& headline);   // steps on time after the load has grown
+
 }  // namespace soda::bench

@@ -22,6 +22,9 @@ constexpr Command kCommands[] = {
      soda::bench::rollback},
     {"latency", "a push in a city, and frames missed while first one world is slow and then the other",
      soda::bench::latency},
+    {"sync-groups", "how many worlds hang together at a step, by the number of bodies", soda::bench::sync_groups},
+    {"granularity", "how many worlds hang together at a step, by the number of worlds", soda::bench::granularity},
+    {"resilience", "steps that stay on time when a world's load grows at once", soda::bench::resilience},
     {"accuracy", "errors of known motions against their cost, for many step settings and stock Bullet",
      soda::bench::accuracy, true},
 };

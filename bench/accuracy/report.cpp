@@ -127,7 +127,10 @@ void print_table(const std::vector<std::pair<const Case*, Verdict>>& verdicts) {
                 c->measures[shown].limit, text_of(v.soda, shown).c_str(), text_of(v.bullet, shown).c_str(),
                 ratio.c_str());
   }
-  std::printf("\nWhat fails:\n");
+  const bool any = std::any_of(verdicts.begin(), verdicts.end(), [](const auto& v) {
+    return (!v.second.soda.passes && v.second.soda.setting) || (!v.second.bullet.passes && v.second.bullet.setting);
+  });
+  std::printf("\nWhat fails:%s\n", any ? "" : " nothing");
   for (const auto& [c, v] : verdicts) {
     if (!v.description.empty() && c->variants.size() > 1) continue;  // its variants tell
     if (!v.soda.passes && v.soda.setting)

@@ -133,7 +133,7 @@ void check(LaunchOptions& o) {
 int launch(LaunchOptions options, const Scene& scene, const std::vector<LoggedAction>& actions, StopSignals& signals,
            std::string* difference) {
   const std::vector<WorldId> start = started_here(options);
-  (void)bisect(scene, make_grid(scene), options.worlds);  // says so now if there are more worlds than cells
+  (void)initial_territories(scene, make_grid(scene), options.worlds);  // says so now if they are wrong
   std::string encoded = encode_scene(scene);
   const auto scene_fd = in_memory(encoded), actions_fd = in_memory(encode_actions(actions));
   if (!options.follow.files.record.empty()) options.follow.files.encoded_scene = std::move(encoded);

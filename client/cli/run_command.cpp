@@ -15,14 +15,16 @@
 #include "common/actions/action_log.h"
 #include "common/actions/action_proto.h"
 #include "common/dds/checks.h"
+#include "common/grid.h"
 #include "common/import/load.h"
+#include "common/scene/scene_file.h"
 
 namespace soda::cli {
 namespace {
 
 struct RunOptions : LaunchOptions {
   std::string scene;
-  std::string actions;  // file
+  std::string actions, territories;  // files
   bool worlds_given = false, poses_given = false;
 };
 
@@ -68,7 +70,14 @@ int run(RunOptions& options) {
   StopSignals signals;
   // An import can take long, and knows no signals; nothing has been started yet that would have to be ended.
   signals.on_stop([&] { std::_Exit(128 + signals.received()); });
-  const Scene scene = load(options);
+  Scene scene = load(options);
+  // Unasked, no more worlds than there are cells to own.
+  if (!options.worlds_given && !options.single())
+    options.worlds = std::min<WorldId>(options.worlds, static_cast<WorldId>(make_grid(scene).cells()));
+  if (!options.territories.empty()) {
+    scene.territories = load_territories(options.territories);
+    validate(scene, options.territories);
+  }
   signals.on_stop(nullptr);
   options.follow.substeps = scene.substeps;
   return launch(options, scene, log_of(options.actions, scene), signals);
@@ -81,7 +90,8 @@ void add_run_command(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("run", "simulate a scene on several worlds of this machine");
   command->add_option("scene", o->scene, "scene file (.scene, .txtpb, .sdf, .world)")->required();
   command->add_option("--session", o->session, "name of the session; a new one each time if not given");
-  command->add_option("--worlds", o->worlds, "how many worlds")
+  command
+      ->add_option("--worlds", o->worlds, "how many worlds; unless given no more than the scene's territory has cells")
       ->check(CLI::Range(1u, dds::kMaxWorlds))
       ->capture_default_str();
   command->add_option("--steps", o->steps, "the run ends when this step is final everywhere")
@@ -99,6 +109,10 @@ void add_run_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(Step{1}, kLargestWindow))
       ->capture_default_str();
   command->add_option("--actions", o->actions, "file of what is done to bodies, and when (docs/actions.md)")
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("--territories", o->territories,
+                   "file of regions that worlds own at the start, by hand (docs/scenes.md); chosen if not given")
       ->check(CLI::ExistingFile);
   command
       ->add_option("--input-lead", o->lead,

@@ -123,7 +123,10 @@ void print_summary(const Scene& scene, const std::string& file) {
   }
   std::printf("  static bodies   %zu\n", statics);
   std::printf("    shapes        %s\n", list_shapes(fixed).c_str());
-  std::printf("  joints          %s\n", list_joints(scene).c_str());
+  std::printf("  joints          %s%s\n", list_joints(scene).c_str(),
+              scene.joint_method == JointMethod::kDirect     ? "; solved as a whole, however many"
+              : scene.joint_method == JointMethod::kIterated ? "; solved one after the other"
+                                                             : "");
   std::printf("  gravity         %.6g %.6g %.6g m/s^2\n", scene.gravity.x(), scene.gravity.y(), scene.gravity.z());
   const std::string substeps =
       scene.substeps == 0 ? "as many sub-steps as each island needs" : counted(scene.substeps, "sub-step", "sub-steps");
@@ -131,7 +134,10 @@ void print_summary(const Scene& scene, const std::string& file) {
               scene.sleeping ? "on" : "off", scene.max_speed);
   const Grid grid = make_grid(scene);
   std::printf("  territory grid  %d x %d x %d cells of %.6g m (%s)\n", grid.size[0], grid.size[1], grid.size[2],
-              grid.edge, scene.territory_cell > 0 ? "given" : "chosen from the bodies");
+              grid.edge,
+              scene.territory_cell == 0           ? "chosen from the bodies"
+              : scene.territory_cell == grid.edge ? "given"
+                                                  : "at least max_speed x dt; fewer where bodies are far apart");
   for (const std::string& doubt : doubts(scene)) std::printf("  note: %s\n", doubt.c_str());
 }
 

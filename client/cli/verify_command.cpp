@@ -24,6 +24,7 @@ int verify(VerifyOptions& options) {
   Recording recording = load_recording(options.recording, false);
   const pb::RecordedSettings& settings = recording.settings;
   if (!options.worlds_given) options.worlds = options.single() ? 1 : std::clamp(settings.worlds(), 1u, dds::kMaxWorlds);
+  if (options.worlds != settings.worlds()) recording.scene.territories.clear();  // they were for other worlds
   options.pace = "max";
   options.steps = static_cast<Step>(recording.digests.size()) - 1;
   check(options);

@@ -81,7 +81,7 @@ SceneModel::SceneModel(const Scene& scene, WorldId worlds) : meshes_(options_for
   add_vector(*welcome_.mutable_low(), box.min());
   add_vector(*welcome_.mutable_high(), box.max());
   if (worlds == 0) return;
-  const TerritoryMap map = bisect(scene, make_grid(scene), worlds);
+  const TerritoryMap map = initial_territories(scene, make_grid(scene), worlds);
   view::Grid& grid = *welcome_.mutable_grid();
   add_vector(*grid.mutable_origin(), map.grid.origin);
   grid.set_edge(map.grid.edge);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "common/ids.h"
 #include "idl/soda.h"
 
 namespace eprosima::fastcdr {
@@ -14,7 +15,7 @@ class Cdr;
 
 namespace soda::dds {
 
-constexpr std::uint32_t kMaxWorlds = 4096;
+using soda::kMaxWorlds;
 constexpr std::int64_t kMaxStepNumber = std::int64_t{1} << 40;  // 500 years at 60 Hz
 constexpr std::size_t kMaxChunkBytes = 512 * 1024;              // of a scene or a state in one sample
 constexpr std::size_t kMaxBorderBytes = 256 * 1024 * 1024;      // of one border message

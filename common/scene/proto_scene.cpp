@@ -111,6 +111,7 @@ class SceneReader {
     if (message_.has_gravity()) scene_.gravity = read_vec3(message_.gravity(), "gravity");
     if (message_.has_dt()) scene_.dt = message_.dt();
     if (message_.has_model()) read_model(message_.model());
+    scene_.territories = read_territories(message_.territory());
     if (message_.has_sleeping()) scene_.sleeping = message_.sleeping();
     if (message_.has_max_speed()) scene_.max_speed = message_.max_speed();
     scene_.territory_cell = message_.territory_cell();
@@ -125,7 +126,8 @@ class SceneReader {
   void read_model(const pb::Model& model) {
     refuse_unknown(model, "model");
     if (model.has_substeps()) {
-      if (model.substeps() == 0) throw FieldError("model.substeps", "is 0; left out, it is chosen for each island");
+      if (model.substeps() == 0)
+        throw FieldError("model.substeps", "must be between 1 and 64, is 0; left out, it is chosen for each island");
       scene_.substeps = model.substeps();
     }
     switch (model.joints()) {
@@ -366,12 +368,31 @@ class SceneReader {
 
 }  // namespace
 
+std::vector<Territory> read_territories(const google::protobuf::RepeatedPtrField<pb::Territory>& messages) {
+  std::vector<Territory> territories;
+  for (int i = 0; i < messages.size(); ++i) {
+    const std::string field = "territory[" + std::to_string(i) + "]";
+    const pb::Territory& message = messages[i];
+    refuse_unknown(message, field);
+    if (!message.has_min() || !message.has_max()) throw FieldError(field, "min and max must be given");
+    territories.push_back(
+        {message.world(), {read_vec3(message.min(), field + ".min"), read_vec3(message.max(), field + ".max")}});
+  }
+  return territories;
+}
+
 pb::Scene to_proto(const Scene& scene) {
   pb::Scene message;
   message.set_body_count(scene.bodies.size());
   message.set_name(scene.name);
   write_vec3(scene.gravity, message.mutable_gravity());
   message.set_dt(scene.dt);
+  for (const Territory& t : scene.territories) {
+    pb::Territory* out = message.add_territory();
+    out->set_world(t.world);
+    write_vec3(t.region.min, out->mutable_min());
+    write_vec3(t.region.max, out->mutable_max());
+  }
   if (scene.substeps != 0) message.mutable_model()->set_substeps(scene.substeps);
   if (scene.joint_method == JointMethod::kDirect) message.mutable_model()->set_joints(pb::Model::DIRECT);
   if (scene.joint_method == JointMethod::kIterated) message.mutable_model()->set_joints(pb::Model::ITERATED);

@@ -22,4 +22,7 @@ pb::Scene to_proto(const Scene& scene);
 // loader, mesh files are refused.
 Scene from_proto(const pb::Scene& message, std::string_view source, const MeshLoader& mesh_loader = {});
 
+// Throws FieldError, which names territory[I] and what is wrong with it.
+std::vector<Territory> read_territories(const google::protobuf::RepeatedPtrField<pb::Territory>& messages);
+
 }  // namespace soda

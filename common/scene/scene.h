@@ -101,6 +101,13 @@ struct Body {
   std::uint32_t colour = 0xb0b0b0ff;  // RGBA, for display
 };
 
+// A part of space that one world of a session owns at the start. Of what lies in none the nearest one's world has it;
+// of what lies in several the last one's.
+struct Territory {
+  WorldId world = 0;
+  Aabb region;  // m
+};
+
 // How joints that hang together by bodies are solved.
 enum class JointMethod : std::uint8_t {
   kChosen,    // as a whole unless that would take too long
@@ -114,9 +121,10 @@ struct Scene {
   double dt = 1.0 / 60;              // s, one step
   std::uint32_t substeps = 0;        // solver sub-steps per step; 0: chosen for each island by its state
   JointMethod joint_method = JointMethod::kChosen;
-  bool sleeping = true;       // whether quiet islands may sleep
-  double max_speed = 100;     // m/s; faster bodies are clamped, counted and reported
-  double territory_cell = 0;  // m, edge of a territory cell; 0: chosen from the bodies (grid.h)
+  bool sleeping = true;                // whether quiet islands may sleep
+  double max_speed = 100;              // m/s; faster bodies are clamped, counted and reported
+  double territory_cell = 0;           // m, edge of a territory cell; 0: chosen from the bodies (grid.h)
+  std::vector<Territory> territories;  // given by hand; empty: chosen (territory.h)
   std::vector<Geometry> geometries;
   std::vector<Body> bodies;   // ascending by id
   std::vector<Joint> joints;  // ascending by a, then b; no joint names a body that is not there

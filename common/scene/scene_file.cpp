@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "common/atomic_file.h"
+#include "common/scene/proto_geometry.h"
 #include "common/scene/proto_text.h"
 
 namespace soda {
@@ -38,7 +39,7 @@ constexpr const char* kTextHeader =
   throw SceneError(std::string(source), "", "", reason, line);
 }
 
-void parse_text(std::string_view text, std::string_view source, pb::Scene& message,
+void parse_text(std::string_view text, std::string_view source, gp::Message& message,
                 gp::TextFormat::ParseInfoTree* lines) {
   if (const auto problem = read_text(text, message, lines))
     refuse(source, problem->reason + " (column " + std::to_string(problem->column) + ")", problem->line);
@@ -131,6 +132,7 @@ std::string scene_to_text(const Scene& scene) {
   message.clear_joint_count();
   if (message.has_model()) *first.mutable_model() = message.model();
   message.clear_model();
+  first.mutable_territory()->Swap(message.mutable_territory());
   std::string count, text;
   if (!printer.PrintToString(first, &count) || !printer.PrintToString(message, &text))
     refuse(scene.name, "cannot be written as text");
@@ -159,6 +161,19 @@ Scene load_scene(const std::filesystem::path& path, const MeshLoader& mesh_loade
   if (extension == ".txtpb") return scene_from_text(read_file(path), path.string(), mesh_loader);
   if (extension == ".scene") return decode_scene(read_file(path), path.string());
   refuse(path.string(), "has not the extension of a scene: .txtpb (text) or .scene (binary)");
+}
+
+std::vector<Territory> load_territories(const std::filesystem::path& path) {
+  const std::string text = read_file(path);
+  check_size(text, path.string());
+  pb::Territories message;
+  parse_text(text, path.string(), message, nullptr);
+  try {
+    if (message.territory().empty()) throw FieldError("territory", "there is none");
+    return read_territories(message.territory());
+  } catch (const FieldError& e) {
+    throw SceneError(path.string(), "", e.field, e.reason);
+  }
 }
 
 void save_scene(const Scene& scene, const std::filesystem::path& path) {

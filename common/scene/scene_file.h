@@ -29,6 +29,10 @@ Scene decode_scene(std::string_view bytes, std::string_view source_name);
 std::string scene_to_text(const Scene& scene);
 Scene scene_from_text(std::string_view text, std::string_view source_name, const MeshLoader& mesh_loader = {});
 
+// Territories by hand, from a text file of a pb.Territories (idl/scene.proto). They are checked with the scene that
+// they are given to. Throws SceneError.
+std::vector<Territory> load_territories(const std::filesystem::path& path);
+
 // Whole files, for scenes and what they refer to. Throw SceneError. write_file writes as save_scene does (AtomicFile).
 std::string read_file(const std::filesystem::path& path);
 void write_file(const std::filesystem::path& path, std::string_view bytes);

@@ -198,12 +198,22 @@ MaybeProblem scene_problem(const Scene& scene) {
   if (auto p = name_problem(scene.name)) return p;
   if (auto p = length_in_range("gravity", scene.gravity, kMaxAcceleration, " m/s^2")) return p;
   if (auto p = in_range("dt", scene.dt, kMinStep, kMaxStep, " s")) return p;
-  if (auto p = in_range("model.substeps", scene.substeps, 0, kMaxSubsteps)) return p;
+  if (scene.substeps > kMaxSubsteps)
+    return Problem{"model.substeps",
+                   "must be between 1 and " + std::to_string(kMaxSubsteps) + ", is " + std::to_string(scene.substeps)};
   if (scene.joint_method > JointMethod::kIterated) return Problem{"model.joints", "is of no known kind"};
   if (auto p = in_range("max_speed", scene.max_speed, 0, kMaxSpeedLimit, " m/s")) return p;
   if (scene.max_speed == 0) return Problem{"max_speed", "must be positive, is 0"};
   if (scene.territory_cell != 0)
     if (auto p = size_in_range("territory_cell", scene.territory_cell)) return p;
+  for (std::size_t i = 0; i < scene.territories.size(); ++i) {
+    const std::string field = "territory[" + std::to_string(i) + "]";
+    const Territory& t = scene.territories[i];
+    if (auto p = in_range(field + ".world", t.world, 0, kMaxWorlds - 1)) return p;
+    if (auto p = coordinates(field + ".min", t.region.min)) return p;
+    if (auto p = coordinates(field + ".max", t.region.max)) return p;
+    if (!(t.region.min.array() <= t.region.max.array()).all()) return Problem{field + ".max", "must not be below min"};
+  }
   if (scene.bodies.empty()) return Problem{"body", "the scene has no bodies"};
   return {};
 }

@@ -64,7 +64,8 @@ MaybeProblem ends_problem(const Scene& scene, const Joint& joint) {
     if (!(std::abs(cosine) <= kMostCosineOfUniversal))
       return Problem{
           "universal",
-          "x of frame a and y of frame b must be across each other, the cosine of their angle is " + number(cosine)};
+          "x of frame a and y of frame b must be at right angles (within 6 degrees); the cosine of their angle is " +
+              number(cosine)};
   }
   if (!(apart <= most))
     return Problem{"", "the bodies are " + number(apart) + " m apart at this joint; at most " + number(most) + " m"};

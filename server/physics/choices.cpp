@@ -25,7 +25,7 @@ bool is_fixed(const BodyModel& body) { return body.inverse_mass == 0; }
 
 }  // namespace
 
-// How far each body is from something that does not give way, in contacts; joints are solved as a whole and count
+// How far each body is from something that does not give way, in contacts; joints that are solved as a whole count
 // nothing. Returns the largest, 0 where nothing rests on anything. Breadth first, what costs nothing at once.
 std::uint32_t Chooser::depth_from_ground(const IslandView& island) {
   constexpr std::uint32_t kNone = 0xffffffffu;
@@ -40,7 +40,7 @@ std::uint32_t Chooser::depth_from_ground(const IslandView& island) {
   for (std::uint32_t k = 0; k < island.contacts.size(); ++k) {
     const Ends& ends = island.ends[island.contacts[k]];
     if (ends.b == kStaticSlot) {
-      depth_[ends.a] = std::min(depth_[ends.a], is_joint(island.records[island.contacts[k]]) ? 0u : 1u);
+      depth_[ends.a] = std::min(depth_[ends.a], bears(island.records[island.contacts[k]]) ? 1u : 0u);
     } else {
       next_[2 * k] = std::exchange(first_[ends.a], 2 * k);
       next_[2 * k + 1] = std::exchange(first_[ends.b], 2 * k + 1);
@@ -59,10 +59,10 @@ std::uint32_t Chooser::depth_from_ground(const IslandView& island) {
       for (std::uint32_t end = first_[body]; end != kNone; end = next_[end]) {
         const std::uint32_t contact = island.contacts[end / 2];
         const std::uint32_t other = end % 2 ? island.ends[contact].a : island.ends[contact].b;
-        const bool joint = is_joint(island.records[contact]);
-        if (depth_[other] <= depth + (joint ? 0 : 1)) continue;
-        depth_[other] = depth + (joint ? 0 : 1);
-        (joint ? level_ : later_).push_back(other);
+        const bool further = bears(island.records[contact]);
+        if (depth_[other] <= depth + (further ? 1 : 0)) continue;
+        depth_[other] = depth + (further ? 1 : 0);
+        (further ? later_ : level_).push_back(other);
       }
     }
     level_.clear();
@@ -76,12 +76,12 @@ std::uint32_t Chooser::depth_from_ground(const IslandView& island) {
 // the square of the sub-steps, for what one pass takes to run through it.
 double Chooser::stiffness_wanted(const IslandView& island) {
   const double gravity = constants_.gravity.norm();
-  const auto touch = [&](std::uint32_t c) { return !is_joint(island.records[c]); };
+  const auto touch = [&](std::uint32_t c) { return bears(island.records[c]); };
   if (!(gravity > 0) || std::none_of(island.contacts.begin(), island.contacts.end(), touch)) return 0;
   const double deepest = depth_from_ground(island);
   double slenderness = 0;  // largest mass ratio over size, 1/m
   for (const std::uint32_t c : island.contacts) {
-    if (is_joint(island.records[c])) continue;
+    if (!bears(island.records[c])) continue;
     const std::uint32_t a = island.ends[c].a, b = island.ends[c].b;
     if (b == kStaticSlot || is_fixed(*island.models[a]) || is_fixed(*island.models[b])) {
       const BodyModel& moving = *island.models[b != kStaticSlot && is_fixed(*island.models[a]) ? b : a];

@@ -34,11 +34,13 @@ struct IslandView {
 
 class Chooser {
  public:
-  Chooser(const Model& model, const StepConstants& constants) : model_(model), constants_(constants) {}
+  Chooser(const Model& model, const StepConstants& constants)
+      : model_(model), constants_(constants), iterated_(model.scene().joint_method == JointMethod::kIterated) {}
 
   Choice choose(const IslandView& island);
 
  private:
+  bool bears(const ContactRecord& record) const { return iterated_ || !is_joint(record); }
   double stiffness_wanted(const IslandView& island);
   double swing_wanted(const IslandView& island, std::uint32_t record) const;
   double motion_wanted(const IslandView& island) const;
@@ -46,6 +48,7 @@ class Chooser {
 
   const Model& model_;
   const StepConstants& constants_;
+  const bool iterated_;                              // joints are, and so bear loads as contacts do
   std::vector<std::uint32_t> depth_, first_;         // scratch, by position of the body
   std::vector<std::uint32_t> next_, level_, later_;  // scratch
 };

@@ -199,8 +199,8 @@ void IslandSolver::settle_torques(std::span<MovingBody> bodies) const {
       const Vec3 of_a = -batch.moves_on_a[l] * get(batch.owed, l),
                  of_b = (batch.moves_on_a[l] - 1) * get(batch.owed, l);
       const Vec3 turn_a = a.inverse_inertia * of_a, turn_b = b.inverse_inertia * of_b;
-      // Of small bodies that whirl it would be out of all proportion: what would turn them by much, and make them faster by
-      // more than a little, is left unpaid.
+      // Of small bodies that whirl it would be out of all proportion: what would turn them by much, and make them
+      // faster by more than a little, is left unpaid.
       const double first_order = of_a.dot(a.w) + of_b.dot(b.w);
       const double work = first_order + 0.5 * (of_a.dot(turn_a) + of_b.dot(turn_b));
       const double turn = constants_.dt * std::sqrt(std::max(turn_a.squaredNorm(), turn_b.squaredNorm()));

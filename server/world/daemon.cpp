@@ -44,7 +44,7 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
       transport_(transport),
       reports_(reports),
       model_(std::move(scene)),
-      map_(bisect(model_.scene(), make_grid(model_.scene()), settings.worlds)),
+      map_(initial_territories(model_.scene(), make_grid(model_.scene()), settings.worlds)),
       feed_(settings.instance, settings.me, model_.scene().dt, reports),
       recorder_(settings.instance, settings.me, settings.dump_first, settings.dump_last, settings.pose_every, reports,
                 feed_) {

@@ -92,6 +92,26 @@ TEST_F(Command, ExplainTellsHowASceneWasModelled) {
   EXPECT_NE(machines.find("joints solved as a whole"), std::string::npos) << machines;
 }
 
+TEST_F(Command, TerritoriesByHandChangeNoBit) {
+  const std::string piles = scene("piles", 200);
+  std::ofstream(path("hand.txtpb"))
+      << "territory { world: 0 min { x: -1000 y: -1000 z: -1000 } max { y: 1000 z: 1000 } }\n"
+         "territory { world: 1 min { y: -1000 z: -1000 } max { x: 1000 y: 1000 z: 1000 } }\n";
+  const std::vector<std::string> common = {"--steps", "60", "--pace", "max", "-q"};
+  const auto with = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), common.begin(), common.end());
+    return arguments;
+  };
+  run(with({"run", piles, "--sync", "single", "--hash-log", path("one.log")}));
+  run(with({"run", piles, "--worlds", "2", "--territories", path("hand.txtpb"), "--hash-log", path("two.log"),
+            "--stats", path("stats"), "--record", path("run.rec")}));
+  expect_equal_logs(path("one.log"), path("two.log"));
+  run({"verify", path("run.rec"), "--worlds", "3"}, 0);
+  expect_bad(with({"run", piles, "--worlds", "3", "--territories", path("hand.txtpb")}), "given to 2 worlds");
+  std::ofstream(path("bad.txtpb")) << "territory { world: 0 min { x: nan } max {} }\n";
+  expect_bad(with({"run", piles, "--worlds", "1", "--territories", path("bad.txtpb")}), "territory[0].min.x");
+}
+
 TEST_F(Command, DiffNamesTheFirstStepThatDiffers) {
   const std::string file = scene("cubes", 50);
   run({"run", file, "--sync", "single", "--steps", "20", "--pace", "max", "--hash-log", path("a.log")});

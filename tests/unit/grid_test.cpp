@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <queue>
@@ -10,6 +11,7 @@
 
 #include "common/scene/generators.h"
 #include "common/scene/random.h"
+#include "common/scene/scene_builder.h"
 #include "common/territory.h"
 
 namespace soda {
@@ -120,6 +122,43 @@ TEST(Territories, AreAPureFunctionOfTheirArguments) {
   const Scene scene = generate("city", 500, 4);
   const Grid grid = make_grid(scene);
   EXPECT_EQ(bisect(scene, grid, 5).owner, bisect(generate("city", 500, 4), make_grid(scene), 5).owner);
+}
+
+TEST(Territories, GiveLessSpaceWhereThereIsMuchToTouch) {
+  // Evenly spread bodies; pillars stand on the left.
+  SceneBuilder builder("pillars");
+  for (int x = 0; x < 40; ++x)
+    for (int y = 0; y < 10; ++y) builder.add(Sphere{0.3}, Vec3(2 * x, 2 * y, 0.3));
+  const auto cut = [](const Scene& scene) {
+    const TerritoryMap map = bisect(scene, make_grid(scene), 2);
+    return std::count(map.owner.begin(), map.owner.end(), map.owner[0]);
+  };
+  SceneBuilder plain = builder;
+  for (int x = 0; x < 20; ++x)
+    for (int y = 0; y < 10; ++y)
+      for (int z = 0; z < 3; ++z) builder.add_static(Box{Vec3(0.3, 0.3, 0.3)}, Vec3(2 * x + 1, 2 * y + 1, 0.3 * z));
+  builder.add_ground(500);  // is everywhere
+  EXPECT_LT(cut(builder.finish()), cut(plain.finish()));
+}
+
+TEST(Territories, ByHandGoToTheLastOrTheNearest) {
+  Scene scene = generate("piles", 300, 3);
+  const Grid grid = make_grid(scene);
+  const Vec3 low = grid.origin, high = grid.origin + grid.edge * Vec3(grid.size[0], grid.size[1], grid.size[2]);
+  const Vec3 middle = 0.5 * (low + high);
+  // World 1 has the right half, world 2 a part of it; nobody is given the far left, which the nearest gets.
+  scene.territories = {{0, {Vec3(middle.x() - 2 * grid.edge, low.y(), low.z()), Vec3(middle.x(), high.y(), high.z())}},
+                       {1, {Vec3(middle.x(), low.y(), low.z()), high}},
+                       {2, {Vec3(middle.x(), low.y(), low.z()), Vec3(high.x(), middle.y(), high.z())}}};
+  const TerritoryMap map = initial_territories(scene, grid, 3);
+  const double e = 0.1 * grid.edge;
+  EXPECT_EQ(map.owner_of(low + Vec3(e, e, e)), 0u);
+  EXPECT_EQ(map.owner_of(Vec3(high.x() - e, high.y() - e, low.z() + e)), 1u);
+  EXPECT_EQ(map.owner_of(Vec3(high.x() - e, low.y() + e, low.z() + e)), 2u);
+  EXPECT_THROW(initial_territories(scene, grid, 2), std::invalid_argument);
+  EXPECT_NO_THROW(initial_territories(scene, grid, 1));
+  scene.territories[2].region = {high + Vec3(1, 1, 1), high + Vec3(2, 2, 2)};
+  EXPECT_THROW(initial_territories(scene, grid, 3), std::invalid_argument);
 }
 
 TEST(Territories, EveryWorldHasACellOrAnErrorIsThrown) {

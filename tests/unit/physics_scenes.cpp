@@ -138,8 +138,8 @@ Scene wide_scene() {
   const Box crate{Vec3(0.3, 0.3, 0.3)};
   for (int x = -2; x <= 2; ++x)
     for (int y = -1; y <= 1; ++y) builder.add(crate, Vec3(2.5 * x, y, 0.16));
-  builder.add(Box{Vec3(11, 3, 0.2)}, Vec3(0, 0, 0.45));                                 // a slab on fifteen crates
-  builder.add(Box{Vec3(8, 0.3, 0.1)}, Vec3(0, 1, 1.2), rotation_of(Vec3(0, 0.05, 0)));  // a plank that falls on it
+  builder.add(Box{Vec3(11, 3, 0.2)}, Vec3(0, 0, 0.45));                                  // a slab on fifteen crates
+  builder.add(Box{Vec3(8, 0.3, 0.1)}, Vec3(0, 1, 1.2), rotation_of(Vec3(0, 0.05, 0)));   // a plank that falls on it
   builder.add(Sphere{1.5}, Vec3(3, -0.5, 4), Quat::Identity(), 50).angular_damping = 3;  // or it rolls for ever
   for (int i = 0; i < 40; ++i)
     builder.add(crate, random.between(Vec3(-5, -1.3, 1.6), Vec3(1, 1.3, 1.7)) + Vec3(0, 0, 0.5 * (i % 8)),

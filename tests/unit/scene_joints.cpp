@@ -49,6 +49,7 @@ Scene every_joint() {
   builder.add_joint(JointKind::kBall, 0, 1, between(0));
   builder.add_joint(JointKind::kUniversal, 5, SceneBuilder::kWorld, between(5), Vec3(0.3, 0.2, -0.1)).name = "cardan";
   builder.scene.joint_method = JointMethod::kDirect;
+  builder.scene.territories = {{0, {Vec3(-1, 0, 1.0 / 3), Vec3(0, 1, 2)}}, {1, {Vec3::Zero(), Vec3(1, 1, 1)}}};
   return builder.finish();
 }
 

@@ -101,6 +101,12 @@ inline void expect_same_bits(const Scene& a, const Scene& b) {
               same_bits(a.territory_cell, b.territory_cell));
   EXPECT_EQ(a.substeps, b.substeps);
   EXPECT_EQ(a.joint_method, b.joint_method);
+  ASSERT_EQ(a.territories.size(), b.territories.size());
+  for (std::size_t i = 0; i < a.territories.size(); ++i) {
+    EXPECT_EQ(a.territories[i].world, b.territories[i].world);
+    EXPECT_EQ(a.territories[i].region.min, b.territories[i].region.min);
+    EXPECT_EQ(a.territories[i].region.max, b.territories[i].region.max);
+  }
   EXPECT_EQ(a.sleeping, b.sleeping);
   ASSERT_EQ(a.geometries.size(), b.geometries.size());
   for (std::size_t g = 0; g < a.geometries.size(); ++g) EXPECT_EQ(a.geometries[g].index(), b.geometries[g].index());

@@ -1,0 +1,184 @@
+// soda-bench resilience: how long a world with a full window stays on time when its load grows at once (figure 8 of the
+// paper that SODA comes from): by the formula, by the protocol's core in virtual time, and in real time.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+
+#include "bench/commands.h"
+#include "bench/lone_core.h"
+#include "common/anticipation.h"
+#include "common/run_settings.h"
+#include "common/scene/scene_builder.h"
+#include "server/physics/stepper.h"
+
+namespace soda::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr Step kEntries = 48;     // the window, as in the paper
+constexpr double kRate = 60;      // steps and frames per second
+constexpr Step kMostSteps = 600;  // looked at: what is later on time is called never late
+
+// Everything in contact with everything, again in each step, as in the paper: bodies are put back to where they were.
+class Knot {
+ public:
+  explicit Knot(std::uint32_t bodies) : model_(scene(bodies)), stepper_(model_), start_(model_.initial_state()) {}
+  void step() {
+    BodySet set = start_;
+    stepper_.step(set);
+  }
+
+ private:
+  static Scene scene(std::uint32_t bodies) {
+    SceneBuilder builder("knot");
+    builder.scene.sleeping = false;
+    builder.scene.gravity = Vec3::Zero();
+    for (std::uint32_t i = 0; i < bodies; ++i) builder.add(Box{Vec3(1, 1, 1)}, Vec3(1e-4 * i, 0, 0));
+    return builder.finish();
+  }
+  physics::Model model_;
+  physics::Stepper stepper_;
+  BodySet start_;
+};
+
+double seconds_per_step(std::uint32_t bodies) {
+  Knot knot(bodies);
+  knot.step();
+  return time_of([&] { knot.step(); }, 7);
+}
+
+// So many bodies that a step takes about `seconds`.
+std::uint32_t bodies_for(double seconds) {
+  std::uint32_t low = 2, high = 4;
+  while (seconds_per_step(high) < seconds && high < 4096) low = high, high *= 2;
+  while (high - low > std::max(1u, low / 64)) {
+    const std::uint32_t middle = (low + high) / 2;
+    (seconds_per_step(middle) < seconds ? low : high) = middle;
+  }
+  return high;
+}
+
+struct Lasted {
+  Step steps = 0;   // shown on time
+  double cost = 0;  // s per step, mean
+};
+
+// A core of one world with a full window, whose steps cost so much from then on. Time is virtual.
+Step lasts_in_core(double cost) {
+  SceneBuilder builder("anything");
+  builder.add(Box{Vec3(1, 1, 1)}, Vec3::Zero());
+  LoneCore core(builder.finish(), kMostSteps + 2 * kEntries);
+  Step shown = 0;
+  double busy_until = 0;
+  const auto order = [&] {
+    core->set_limit(shown + kEntries);
+    core->close_actions(shown + kDefaultLead, 0);
+    (void)core->take_outgoing();  // lets go of what is final
+  };
+  // All that can be done by `time`; a step that is begun is there when it is paid for.
+  Step there = 0;
+  const auto work_until = [&](double time, double step_cost) {
+    for (;;) {
+      if (core->clock() > there) {
+        if (busy_until > time) return;
+        there = core->clock();
+      }
+      const Step clock = core->clock();
+      if (core->work() != border::Progress::kWorked) {
+        busy_until = std::max(busy_until, time);
+        return;
+      }
+      if (core->clock() > clock) busy_until += step_cost;
+    }
+  };
+  order();
+  work_until(0, 0);  // the warm-up
+  busy_until = 0;
+  for (Step frame = 1; frame <= kMostSteps; ++frame) {
+    work_until(static_cast<double>(frame) / kRate, cost);
+    if (std::min(there, core->front()) <= shown) return shown;
+    ++shown;
+    order();
+  }
+  return kMostSteps;
+}
+
+Lasted lasts_in_real_time(std::uint32_t bodies, Step most) {
+  Knot knot(bodies);
+  knot.step();
+  Step computed = kEntries, shown = 0;
+  const auto begin = Clock::now();
+  const auto passed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  double busy = 0;
+  Step steps = 0;
+  for (;;) {
+    // Frames that have become due.
+    const Step due = static_cast<Step>(passed() * kRate);
+    if (due > computed || due >= most)
+      return {std::min(computed, due), steps > 0 ? busy / static_cast<double>(steps) : 0};
+    shown = due;
+    if (computed - shown >= kEntries) {
+      std::this_thread::sleep_until(begin + std::chrono::duration_cast<Clock::duration>(
+                                                std::chrono::duration<double>(static_cast<double>(shown + 1) / kRate)));
+      continue;
+    }
+    const double before = passed();
+    knot.step();
+    busy += passed() - before;
+    ++steps;
+    ++computed;
+  }
+}
+
+constexpr const char* kPicture = R"(
+set grid
+set key top right
+set xlabel 'additional load (%)'
+set ylabel 'steps on time'
+set yrange [0:*]
+set title 'A world with 48 steps computed ahead at 60 steps/s, whose load grows at once'
+plot 'resilience.csv' skip 1 using 1:2 with lines lw 2 lc rgb '#909090' title '48 / (1 - budget / cost)', \
+  '' skip 1 using 1:3 with points pt 7 lc rgb '#d1603d' title 'protocol core, virtual time', \
+  '' skip 1 using 4:5 with points pt 6 ps 1.4 lc rgb '#3d7ea6' title 'real time'
+)";
+
+}  // namespace
+
+void resilience(const Options& options, Headline& headline) {
+  Csv table(options, "resilience", "load_percent,limit_steps,core_steps,real_load_percent,real_steps");
+  const double budget = 1 / kRate;
+  std::printf("%10s %12s %12s %26s\n", "load", "limit", "core", "real time (load, steps)");
+  for (int percent = 25; percent <= 300; percent += 25) {
+    const double cost = budget * (1 + percent / 100.0);
+    const double limit = steps_on_time(kEntries, budget, cost);
+    const Step core = lasts_in_core(cost);
+    Lasted real;
+    std::uint32_t bodies = 0;
+    if (!options.quick) {
+      bodies = bodies_for(cost);
+      real = lasts_in_real_time(bodies, kMostSteps);
+    }
+    const double real_percent = 100 * (real.cost / budget - 1);
+    std::printf("%8d %% %12.1f %12lld", percent, limit, static_cast<long long>(core));
+    if (bodies > 0) std::printf(" %12.0f %% %8lld", real_percent, static_cast<long long>(real.steps));
+    std::printf("\n");
+    std::fflush(stdout);
+    table.row(percent, limit, core, real_percent, real.steps);
+    if (percent == 150) {
+      headline.add("limit_at_150", limit);
+      headline.add("steps_at_150", static_cast<double>(core));
+      if (bodies > 0) {
+        headline.add("real_load_percent", real_percent);
+        headline.add("real_steps", static_cast<double>(real.steps));
+        headline.add("real_limit", steps_on_time(kEntries, budget, real.cost));
+      }
+    }
+  }
+  table.close();
+  plot(options, "resilience", kPicture);
+}
+
+}  // namespace soda::bench
