@@ -136,6 +136,7 @@ Lasted lasts_in_real_time(std::uint32_t bodies, Step most) {
 constexpr const char* kPicture = R"(
 set grid
 set key top right
+set xrange [0:325]
 set xlabel 'additional load (%)'
 set ylabel 'steps on time'
 set yrange [0:*]
