@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 
 #include "bench/commands.h"
 #include "common/grid.h"
@@ -18,34 +17,29 @@
 namespace soda::bench {
 namespace {
 
-constexpr int kClasses =
-    5;  // of sizes of groups: 1, 2 or 3, 4 to 7, 8 or more, and, for reading, all that are not alone
-constexpr const char* kClassNames[kClasses] = {"1", "2-3", "4-7", "8+", "not alone"};
+constexpr int kClasses = 4;  // of sizes of groups
+constexpr const char* kClassNames[kClasses] = {"1", "2-3", "4-7", "8+"};
 
-// Worlds that must look at each other's bodies at a step, directly or by others.
+// Worlds that must look at each other's bodies at a step, directly or by others: islands of worlds.
 class Groups {
  public:
-  explicit Groups(WorldId worlds) : parent_(worlds) { std::iota(parent_.begin(), parent_.end(), WorldId{0}); }
-  WorldId root(WorldId w) {
-    while (parent_[w] != w) w = parent_[w] = parent_[parent_[w]];
-    return w;
-  }
-  void join(WorldId a, WorldId b) { parent_[root(a)] = root(b); }
+  explicit Groups(WorldId worlds) : worlds_(worlds) {}
+  void join(WorldId a, WorldId b) { joined_.push_back({a, b}); }
   // How many worlds are in groups of each class.
-  std::array<double, kClasses> worlds_by_class() {
-    std::vector<int> size(parent_.size(), 0);
-    for (WorldId w = 0; w < parent_.size(); ++w) ++size[root(w)];
+  std::array<double, kClasses> worlds_by_class() const {
+    physics::Islands groups;
+    physics::IslandFinder().find(worlds_, joined_, groups);
     std::array<double, kClasses> count{};
-    for (WorldId w = 0; w < parent_.size(); ++w) {
-      const int n = size[root(w)];
-      count[n == 1 ? 0 : n < 4 ? 1 : n < 8 ? 2 : 3] += 1;
-      count[4] += n > 1;
+    for (std::size_t k = 0; k < groups.size(); ++k) {
+      const std::size_t n = groups.bodies_of(k).size();
+      count[n == 1 ? 0 : n < 4 ? 1 : n < 8 ? 2 : 3] += static_cast<double>(n);
     }
     return count;
   }
 
  private:
-  std::vector<WorldId> parent_;
+  WorldId worlds_;
+  std::vector<physics::Ends> joined_;
 };
 
 struct Space {
@@ -148,7 +142,7 @@ Shares mean_of(const Space& space, std::uint32_t bodies, WorldId worlds, const O
 
 void tell(const char* what, const std::array<double, kClasses>& shares) {
   std::printf("  %s", what);
-  for (int c = 0; c < 4; ++c) std::printf("  %s: %3.0f %%", kClassNames[c], 100 * shares[c]);
+  for (int c = 0; c < kClasses; ++c) std::printf("  %s: %3.0f %%", kClassNames[c], 100 * shares[c]);
 }
 
 constexpr const char* kHeader =

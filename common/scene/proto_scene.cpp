@@ -127,7 +127,8 @@ class SceneReader {
     refuse_unknown(model, "model");
     if (model.has_substeps()) {
       if (model.substeps() == 0)
-        throw FieldError("model.substeps", "must be between 1 and 64, is 0; left out, it is chosen for each island");
+        throw FieldError("model.substeps", "must be between 1 and " + std::to_string(kMaxSubsteps) +
+                                               ", is 0; left out, it is chosen for each island");
       scene_.substeps = model.substeps();
     }
     switch (model.joints()) {
