@@ -48,7 +48,8 @@ class Chooser {
 
   const Model& model_;
   const StepConstants& constants_;
-  const bool iterated_;                              // joints are, and so bear loads as contacts do
+  const bool iterated_;  // joints are, and so bear loads as contacts do
+  double deepest_ = 0;   // of the island at hand: contacts from the ground; 0 where nothing rests on anything
   std::vector<std::uint32_t> depth_, first_;         // scratch, by position of the body
   std::vector<std::uint32_t> next_, level_, later_;  // scratch
 };

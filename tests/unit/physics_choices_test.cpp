@@ -128,6 +128,23 @@ TEST(Choices, StiffnessIsRememberedUntilFarLessWouldDo) {
   for (const BodyState& body : world.set.bodies) EXPECT_EQ(body.stiffness(), 2u);
 }
 
+// Many side by side bear each other up: as stiff as the stack that they are as high as, for half of its sub-steps.
+TEST(Choices, AHeapGetsHalfOfTheSubstepsOfAStack) {
+  const auto of = [](int across) {
+    SceneBuilder builder = on_ground();
+    for (int i = 0; i < across; ++i)
+      for (int k = 0; k < 10; ++k) builder.add(Box{Vec3(1, 1, 1)}, Vec3(0.999 * i, 0, k + 0.5));
+    World world(builder);
+    world.steps(20);
+    const std::uint32_t substeps = world.substeps();
+    EXPECT_EQ(world.set.bodies[0].stiffness(), 2u);
+    return substeps;
+  };
+  EXPECT_EQ(of(1), 4u);
+  EXPECT_EQ(of(8), 4u);
+  EXPECT_EQ(of(9), 2u);
+}
+
 // Sub-steps that change from step to step: the impulses that contacts carry follow.
 TEST(Choices, ATowerStandsWhileItsSubstepsChange) {
   SceneBuilder builder = on_ground();
