@@ -10,6 +10,11 @@ void Announcer::extend(Step newest) {
   for (FrameBook& book : books_) book.extend();
 }
 
+void Announcer::add_link(Step newest) {
+  FrameBook& book = books_.emplace_back(oldest_);
+  for (Step step = oldest_; step <= newest; ++step) book.extend();
+}
+
 // Of a body that stays here others need the records with bodies that may be theirs, and of two wide bodies, which whom
 // they reach looks at too; those with its own kind and with the ground matter here alone.
 std::vector<bool> Announcer::wanted(Step step, const timeline::Record& record) const {

@@ -10,10 +10,12 @@ namespace soda::border {
 
 class Announcer {
  public:
-  explicit Announcer(const Context& context) : context_(context), books_(context.links.size()) {}
+  explicit Announcer(const Context& context) : context_(context), books_(context.links.size(), FrameBook(0)) {}
 
   // The timeline has a new entry, a copy of the one before.
   void extend(Step newest);
+  // There is one more link, to whom nothing that is known so far matters.
+  void add_link(Step newest);
   // Adds to the links' next messages what their neighbours do not hold of the steps up to `front`.
   void tell(Step front);
   // A step has become final.

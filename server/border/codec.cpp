@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <string>
 #include <type_traits>
 
@@ -158,6 +159,77 @@ Part get_part(Reader& in, std::span<const std::byte>& rest, const physics::Model
   return part;
 }
 
+void put_cells(std::vector<std::byte>& out, const std::vector<std::uint32_t>& cells) {
+  put(out, static_cast<std::uint32_t>(cells.size()));
+  put_bytes(out, cells.data(), cells.size() * sizeof(std::uint32_t));
+}
+
+std::vector<std::uint32_t> get_cells(Reader& in) {
+  std::vector<std::uint32_t> cells(in.count(sizeof(std::uint32_t), "cells"));
+  in.get_bytes(cells.data(), cells.size() * sizeof(std::uint32_t), "cells");
+  if (cells.empty()) throw CodecError("cells: none");
+  if (std::adjacent_find(cells.begin(), cells.end(), std::greater_equal()) != cells.end())
+    throw CodecError("cells: out of order");
+  return cells;
+}
+
+void put_territory(std::vector<std::byte>& out, const Message& message) {
+  put(out, static_cast<std::uint32_t>(message.transfers.size()));
+  put(out, static_cast<std::uint32_t>(message.offers.size()));
+  put(out, static_cast<std::uint32_t>(message.answers.size()));
+  put(out, static_cast<std::uint8_t>(message.load.has_value()));
+  for (const Transfer& t : message.transfers) {
+    put(out, t.giver);
+    put(out, t.number);
+    put(out, t.step);
+    put(out, t.taker);
+    put_cells(out, t.cells);
+  }
+  for (const Offer& offer : message.offers) {
+    put(out, offer.number);
+    put(out, offer.cost);
+    put_cells(out, offer.cells);
+  }
+  for (const Answer& answer : message.answers) {
+    put(out, answer.number);
+    put(out, static_cast<std::uint8_t>(answer.accepted));
+  }
+  if (message.load)
+    for (const double value : {message.load->work, message.load->expected, message.load->on_time}) put(out, value);
+}
+
+void get_territory(Reader& in, Message& message) {
+  const std::size_t transfers = in.count(24, "transfers"), offers = in.count(16, "offers"),
+                    answers = in.count(5, "answers");
+  const bool has_load = in.get<std::uint8_t>("load") != 0;
+  for (std::size_t i = 0; i < transfers; ++i) {
+    Transfer& t = message.transfers.emplace_back();
+    t.giver = in.get<WorldId>("giver");
+    t.number = in.get<std::uint32_t>("transfer number");
+    t.step = in.get<Step>("transfer step");
+    t.taker = in.get<WorldId>("taker");
+    t.cells = get_cells(in);
+  }
+  for (std::size_t i = 0; i < offers; ++i) {
+    Offer& offer = message.offers.emplace_back();
+    offer.number = in.get<std::uint32_t>("offer number");
+    offer.cost = in.get<double>("offered cost");
+    if (!(offer.cost >= 0) || std::isinf(offer.cost)) throw CodecError("offer: its cost cannot be");
+    offer.cells = get_cells(in);
+  }
+  for (std::size_t i = 0; i < answers; ++i) {
+    const auto number = in.get<std::uint32_t>("answer number");
+    message.answers.push_back({number, in.get<std::uint8_t>("answer") != 0});
+  }
+  if (!has_load) return;
+  Load& load = message.load.emplace();
+  load.work = in.get<double>("load");
+  load.expected = in.get<double>("expected load");
+  load.on_time = in.get<double>("steps on time");
+  if (!(load.work >= 0 && load.expected >= 0 && load.on_time >= 0) || std::isinf(load.work + load.expected))
+    throw CodecError("load: cannot be");
+}
+
 Header get_header(Reader& in) {
   if (in.get<std::uint32_t>("magic") != kMagic) throw CodecError("not a SODA border message");
   if (const auto version = in.get<std::uint32_t>("version"); version != kCodecVersion)
@@ -271,6 +343,7 @@ std::vector<std::byte> encode(const Message& message) {
     put(out, part.step);
     put(out, part.revision);
   }
+  put_territory(out, message);
   return out;
 }
 
@@ -295,6 +368,7 @@ Message decode(std::span<const std::byte> bytes, const physics::Model& model) {
     part.revision = in.get<Revision>("final part revision");
     message.finals.push_back(part);
   }
+  get_territory(in, message);
   if (!in.empty()) throw CodecError("border message: more bytes than it says");
   return message;
 }

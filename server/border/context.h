@@ -2,7 +2,7 @@
 #pragma once
 
 #include <algorithm>
-#include <vector>
+#include <deque>
 
 #include "server/border/link.h"
 #include "server/border/neighbourhood.h"
@@ -16,7 +16,7 @@ struct Context {
   const CoreSettings& settings;
   const Neighbourhood& neighbourhood;
   timeline::Timeline& timeline;
-  std::vector<Link>& links;
+  std::deque<Link>& links;  // more may come, at the end
   CoreStats& stats;
   const Step& final_step;
 
@@ -25,14 +25,13 @@ struct Context {
       if (link.peer() == world) return &link;
     return nullptr;
   }
-  std::size_t index_of(const Link& link) const { return static_cast<std::size_t>(&link - links.data()); }
   bool all_have_reached(Step step) const {
-    return std::all_of(links.begin(), links.end(), [&](const Link& link) { return link.upto() >= step; });
+    return std::all_of(links.begin(), links.end(), [&](const Link& link) { return link.reached(step); });
   }
   // State `step` is final here and with every neighbour: nothing that is known of it can change.
   bool near_final(Step step) const {
     return final_step >= step &&
-           std::all_of(links.begin(), links.end(), [&](const Link& link) { return link.final_step() >= step; });
+           std::all_of(links.begin(), links.end(), [&](const Link& link) { return link.finished(step); });
   }
 };
 

@@ -22,7 +22,9 @@ using NearBodies = std::vector<NearBody>;  // ascending by slot
 
 class FrameBook {
  public:
-  // The list at step `newest` + 1 is that of the step before, until set() says otherwise. The first step is 0.
+  explicit FrameBook(Step first) : base_(first), checked_(first - 1) {}  // without entries
+
+  // The list at step `newest` + 1 is that of the step before, until set() says otherwise.
   void extend();
   const NearBodies& truth(Step step) const { return *at(step).truth; }
   void set(Step step, NearBodies truth);
@@ -44,8 +46,8 @@ class FrameBook {
   Entry& at(Step step) { return entries_.at(static_cast<std::size_t>(step - base_)); }
   const Entry& at(Step step) const { return entries_.at(static_cast<std::size_t>(step - base_)); }
   std::deque<Entry> entries_;
-  Step base_ = 0;
-  Step checked_ = -1;  // up to this step the neighbour holds the truth
+  Step base_;
+  Step checked_;  // up to this step the neighbour holds the truth
 };
 
 }  // namespace soda::border

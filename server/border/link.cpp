@@ -12,8 +12,8 @@ constexpr std::uint64_t kFarthest = 1u << 14;
 
 }  // namespace
 
-Link::Link(std::uint64_t session, WorldId me, std::uint32_t epoch, WorldId peer)
-    : session_(session), me_(me), peer_(peer), epoch_(epoch) {}
+Link::Link(std::uint64_t session, WorldId me, std::uint32_t epoch, WorldId peer, std::size_t index)
+    : session_(session), me_(me), peer_(peer), index_(index), epoch_(epoch) {}
 
 Header Link::header(std::uint64_t sequence, bool need) const {
   Header h;
@@ -43,6 +43,10 @@ void Link::send(Step upto, Step final_step, Step near_final, ActionNumber logged
   next_.frames.clear();
   next_.parts.clear();
   next_.finals.clear();
+  next_.transfers.clear();
+  next_.offers.clear();
+  next_.answers.clear();
+  next_.load.reset();
 }
 
 void Link::interrupted() { ask_ = repeat_ = true; }

@@ -16,15 +16,29 @@ namespace soda::border {
 
 class Link {
  public:
-  Link(std::uint64_t session, WorldId me, std::uint32_t epoch, WorldId peer);
+  // `index`: of the link among this world's.
+  Link(std::uint64_t session, WorldId me, std::uint32_t epoch, WorldId peer, std::size_t index);
 
   WorldId peer() const { return peer_; }
+  std::size_t index() const { return index_; }
+  // The first step at which the two have to do with each other: of earlier ones nothing is told or expected.
+  Step since() const { return since_; }
+  void set_since(Step step) { since_ = step; }
 
   // ---- out
   void add(Frame frame) { next_.frames.push_back(std::move(frame)); }
   void add(Part part) { next_.parts.push_back(std::move(part)); }
   void add(FinalPart part) { next_.finals.push_back(part); }
-  bool has_content() const { return !next_.frames.empty() || !next_.parts.empty() || !next_.finals.empty(); }
+  void add(Transfer transfer) { next_.transfers.push_back(std::move(transfer)); }
+  void add(Offer offer) { next_.offers.push_back(std::move(offer)); }
+  void add(Answer answer) { next_.answers.push_back(answer); }
+  void add(const Load& load) { next_.load = load; }  // with the next message, which it is no reason for
+  bool has_content() const {
+    return !next_.frames.empty() || !next_.parts.empty() || !next_.finals.empty() || !next_.transfers.empty() ||
+           !next_.offers.empty() || !next_.answers.empty();
+  }
+  // Nothing is sent before this world has reached the first step that matters; what is added waits.
+  bool may_send(Step front) const { return sent_ > 0 || front >= since_; }
   Step told_upto() const { return told_upto_; }
   Step told_final() const { return told_final_; }
   Step told_near_final() const { return told_near_final_; }
@@ -44,6 +58,9 @@ class Link {
   Step upto() const { return upto_; }
   Step final_step() const { return final_; }
   Step near_final() const { return near_final_; }
+  // The peer has reached a step, or is done with it, as far as it matters here.
+  bool reached(Step step) const { return step < since_ || upto_ >= step; }
+  bool finished(Step step) const { return step < since_ || final_ >= step; }
   std::uint64_t duplicates() const { return duplicates_; }
   std::uint64_t resent() const { return resent_; }
 
@@ -51,6 +68,8 @@ class Link {
   Header header(std::uint64_t sequence, bool need) const;
   std::uint64_t session_;
   WorldId me_, peer_;
+  std::size_t index_;
+  Step since_ = 0;
   std::uint32_t epoch_;
   std::optional<std::uint32_t> peer_epoch_;  // once heard of
 

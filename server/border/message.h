@@ -4,11 +4,14 @@
 #include <compare>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/actions/action.h"
 #include "common/body_set.h"
 #include "common/ids.h"
+#include "common/load.h"
+#include "server/border/territories.h"
 
 namespace soda::border {
 
@@ -55,6 +58,22 @@ struct FinalPart {
   Revision revision;
 };
 
+// May these cells of the sender, which it keeps otherwise, become the receiver's? One at a time.
+struct Offer {
+  std::uint32_t number = 0;          // of the sender's offers
+  double cost = 0;                   // s of CPU time per step, of what is in them
+  std::vector<std::uint32_t> cells;  // by Grid::index, ascending
+};
+// As the receiver keeps it until it has answered.
+struct Asked {
+  WorldId giver = 0;
+  Offer offer;
+};
+struct Answer {
+  std::uint32_t number = 0;  // of the receiver's offer
+  bool accepted = false;     // then the sender counts on it
+};
+
 struct Header {
   std::uint64_t session = 0;  // what both ends must agree on: see session_tag
   WorldId from = 0, to = 0;
@@ -76,6 +95,10 @@ struct Message {
   std::vector<Frame> frames;
   std::vector<Part> parts;
   std::vector<FinalPart> finals;
+  std::vector<Transfer> transfers;  // that the sender has come to know of, before all that rests on them
+  std::vector<Offer> offers;
+  std::vector<Answer> answers;
+  std::optional<Load> load;
 };
 
 }  // namespace soda::border

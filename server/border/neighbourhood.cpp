@@ -13,18 +13,18 @@ Neighbourhood::Neighbourhood(const physics::Model& model, const Territories& ter
       territories_(territories),
       range_(neighbour_range(model.scene(), territories.grid())),
       me_(me),
+      since_(territories.worlds(), kNever),
       half_edge_(0.5 * territories.grid().edge) {
   model_grew();
-  territories_change();
+  territories_change(-1);
 }
 
-void Neighbourhood::territories_change() {
-  std::vector<std::uint8_t> near(territories_.worlds(), 0);
-  for (const WorldId world : neighbours_) near[world] = 1;
-  territories_.mark_neighbours(me_, range_, near);
-  neighbours_.clear();
-  for (WorldId w = 0; w < near.size(); ++w)
-    if (near[w] && w != me_) neighbours_.push_back(w);
+void Neighbourhood::territories_change(Step now) {
+  for (Step& since : since_)
+    if (since > now) since = kNever;
+  territories_.find_neighbours(me_, range_, since_);
+  since_[me_] = kNever;
+  alone_ = std::all_of(since_.begin(), since_.end(), [](Step since) { return since == kNever; });
 }
 
 void Neighbourhood::model_grew() {
@@ -39,7 +39,7 @@ std::size_t Neighbourhood::cell_of(const BodyState& body) const {
 }
 
 bool Neighbourhood::is_wide(const BodyState& body) const {
-  if (neighbours_.empty()) return false;
+  if (alone_) return false;
   const auto index = static_cast<std::size_t>(model_.find(body.id) - model_.bodies().data());
   if (body.v().squaredNorm() <= ordinary_below_[index]) return false;
   const Aabb box = physics::reach_box(body, model_);
@@ -48,7 +48,7 @@ bool Neighbourhood::is_wide(const BodyState& body) const {
 }
 
 timeline::Place Neighbourhood::place(const BodyState& body, Step step) const {
-  if (neighbours_.empty()) return {me_, false, true};
+  if (alone_) return {me_, false, true};
   const std::size_t cell = cell_of(body);
   timeline::Place place;
   place.owner = territories_.owner(cell, step);

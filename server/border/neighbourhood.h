@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "common/body_state.h"
@@ -16,12 +17,14 @@ class Neighbourhood {
   // `model` and `territories` must outlive it.
   Neighbourhood(const physics::Model& model, const Territories& territories, WorldId me);
 
-  void model_grew();          // a body has been added to the model
-  void territories_change();  // a transfer has become known
+  void model_grew();                  // a body has been added to the model
+  void territories_change(Step now);  // a transfer has become known, of a step after `now`
 
-  // Worlds with a cell so near to one of ours, at any step that is known of, that a body can matter to both: within two
-  // cells, or more where the scene's largest body, or its largest speed, reaches further. Ascending; only ever grows.
-  const std::vector<WorldId>& neighbours() const { return neighbours_; }
+  // From which step on a world has a cell so near to one of ours that a body can matter to both: within two cells, or
+  // more where the scene's largest body, or its largest speed, reaches further. kNever: at none that is known of. What
+  // has begun does not end.
+  static constexpr Step kNever = std::numeric_limits<Step>::max();
+  Step neighbour_since(WorldId world) const { return since_[world]; }
 
   WorldId owner(const BodyState& body, Step step) const { return territories_.owner_of(body.x(), step); }
   std::size_t own_cells(Step step) const { return territories_.cells_of(me_, step); }
@@ -47,7 +50,8 @@ class Neighbourhood {
   const Territories& territories_;
   const int range_;  // cells
   WorldId me_;
-  std::vector<WorldId> neighbours_;
+  std::vector<Step> since_;  // by world
+  bool alone_ = true;        // no world is a neighbour, ever
   double half_edge_ = 0;
   // By body: below this square of its speed, (m/s)^2, its reach box cannot leave half a cell, however it turns.
   std::vector<double> ordinary_below_;

@@ -73,7 +73,7 @@ void Settler::find_threats(Step step) {
   const timeline::Timeline& timeline = context_.timeline;
   for (std::size_t l = 0; l < context_.links.size(); ++l) {
     const Step seen = std::max(context_.links[l].upto(), timeline.oldest());
-    if (seen >= step) continue;
+    if (seen >= step || context_.links[l].reached(step)) continue;
     const auto add = [&](const timeline::Record& record) {
       if (!record.body.asleep())
         threats_.add(physics::reach_box(record.body, context_.model), record.body.v(),
@@ -192,7 +192,7 @@ bool Settler::try_shared(Step step, KeptIsland& island, const std::function<void
     // A part may come before its world's bodies (passed on by others), or be that of a world which has fallen back.
     const bool all_there = std::all_of(closure.worlds.begin(), closure.worlds.end(), [&](WorldId w) {
       const Link* const link = context_.link_to(w);
-      return !link || link->upto() >= step;
+      return !link || link->reached(step);
     });
     if (all_there) whole = exchange.parts.assemble(closure, closure.misfit);
   }

@@ -25,6 +25,11 @@ class Settler {
   bool must_wait(std::span<const Aabb> boxes) { return threats_.meet(boxes); }  // at the step of the last find_threats
   void keep(Step step, timeline::Found found);
 
+  // There is one more link.
+  void add_link() {
+    for (Exchange& exchange : exchanges_) exchange.told.emplace_back();
+  }
+
   // Where those may be at `step` for whom its islands must wait.
   void find_threats(Step step);
 

@@ -31,7 +31,8 @@ bool earlier(const Transfer& l, const Transfer& r) {
 
 }  // namespace
 
-Territories::Territories(const TerritoryMap& initial) : grid_(initial.grid), worlds_(initial.worlds) {
+Territories::Territories(const TerritoryMap& initial)
+    : grid_(initial.grid), worlds_(initial.worlds), known_(initial.worlds, 0) {
   Version& first = versions_.emplace_back();
   first.owner = initial.owner;
   first.sole.resize(first.owner.size());
@@ -45,22 +46,47 @@ const Territories::Version& Territories::at(Step step) const {
   return *version;
 }
 
-bool Territories::knows(WorldId giver, std::uint32_t number) const {
-  return std::any_of(transfers_.begin(), transfers_.end(),
-                     [&](const Transfer& t) { return t.giver == giver && t.number == number; });
+std::string Territories::fault(const Transfer& t) const {
+  if (t.giver >= worlds_ || t.taker >= worlds_ || t.giver == t.taker) return "such worlds cannot be";
+  if (t.number <= known_[t.giver]) return {};
+  if (t.number != known_[t.giver] + 1) return "others of its giver have to come before it";
+  if (t.step <= versions_.front().from) return "it would begin at a step that is past";
+  if (t.cells.empty()) return "without cells";
+  for (std::size_t i = 0; i < t.cells.size(); ++i) {
+    if (t.cells[i] >= grid_.cells()) return "there is no cell " + std::to_string(t.cells[i]);
+    if (i > 0 && t.cells[i] <= t.cells[i - 1]) return "its cells are out of order";
+    if (owner(t.cells[i], t.step - 1) != t.giver) return "cell " + std::to_string(t.cells[i]) + " is not its giver's";
+  }
+  return {};
 }
 
 bool Territories::add(const Transfer& transfer) {
-  if (knows(transfer.giver, transfer.number)) return false;
-  if (transfer.step <= 0) throw std::invalid_argument("a transfer begins at a step after the first");
+  if (const std::string why = fault(transfer); !why.empty())
+    throw std::invalid_argument("transfer " + std::to_string(transfer.number) + " of world " +
+                                std::to_string(transfer.giver) + ": " + why);
+  if (transfer.number <= known_[transfer.giver]) return false;
+  known_[transfer.giver] = transfer.number;
   transfers_.insert(std::upper_bound(transfers_.begin(), transfers_.end(), transfer, earlier), transfer);
   rebuild_from(transfer.step);
   return true;
 }
 
+bool Territories::keeps(WorldId world, std::size_t cell, Step step) const {
+  return owner(cell, step) == world && std::all_of(versions_.begin(), versions_.end(), [&](const Version& v) {
+           return v.from <= step || v.owner[cell] == world;
+         });
+}
+
+void Territories::release_before(Step step, Step memory) {
+  while (versions_.size() > 1 && versions_[1].from <= step) versions_.erase(versions_.begin());
+  std::erase_if(transfers_, [&](const Transfer& t) { return t.step < step - memory; });
+}
+
 // Makes the versions from this step on anew.
 void Territories::rebuild_from(Step step) {
-  std::erase_if(versions_, [&](const Version& v) { return v.from >= step && v.from > 0; });
+  versions_.erase(
+      std::find_if(versions_.begin() + 1, versions_.end(), [&](const Version& v) { return v.from >= step; }),
+      versions_.end());
   for (std::size_t i = 0; i < transfers_.size();) {
     const Step from = transfers_[i].step;
     std::size_t end = i;
@@ -104,8 +130,7 @@ std::size_t Territories::cells_of(WorldId world, Step step) const {
   return static_cast<std::size_t>(std::count(owner.begin(), owner.end(), world));
 }
 
-void Territories::mark_neighbours(WorldId world, int range, std::vector<std::uint8_t>& marked) const {
-  marked.resize(worlds_, 0);
+void Territories::find_neighbours(WorldId world, int range, std::vector<Step>& since) const {
   // Who gives cells away tells their new owner of what is in them, wherever else that one is.
   std::vector<std::uint8_t> near;
   for (std::size_t v = 0; v < versions_.size(); ++v) {
@@ -114,7 +139,8 @@ void Territories::mark_neighbours(WorldId world, int range, std::vector<std::uin
     for (std::size_t i = 0; i < near.size(); ++i) near[i] = now[i] == world || before[i] == world;
     dilate(grid_, range, near);
     for (std::size_t i = 0; i < near.size(); ++i)
-      if (near[i]) marked[now[i]] = marked[before[i]] = 1;
+      if (near[i])
+        for (const WorldId other : {now[i], before[i]}) since[other] = std::min(since[other], versions_[v].from);
   }
 }
 

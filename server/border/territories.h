@@ -1,8 +1,9 @@
-// Who owns which cell at which step: the initial territories and the transfers of cells that are known. Steps before a
-// transfer's are never asked about again in another way: what is learnt of them must be learnt in time (transfers.h).
+// Who owns which cell at which step: the initial territories and the transfers of cells that are known. A transfer must
+// become known before anything of its step is computed; trade.h is how it does.
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "common/territory.h"
@@ -26,10 +27,13 @@ class Territories {
 
   const Grid& grid() const { return grid_; }
   WorldId worlds() const { return worlds_; }
-  // Takes a transfer of cells that are the giver's at the step before; false where it is known already.
+  // Why a transfer cannot be: cells that there are not, or that are not the giver's at the step before, a number that
+  // is not the giver's next. Empty where it can be, or is known already.
+  std::string fault(const Transfer& transfer) const;
+  // Takes a transfer without fault; false where it is known already.
   bool add(const Transfer& transfer);
-  bool knows(WorldId giver, std::uint32_t number) const;
-  const std::vector<Transfer>& transfers() const { return transfers_; }  // by step, giver, number
+  std::uint32_t known(WorldId giver) const { return known_[giver]; }     // number of the newest transfer of that world
+  const std::vector<Transfer>& transfers() const { return transfers_; }  // that are remembered: by step, giver, number
 
   WorldId owner(std::size_t cell, Step step) const { return at(step).owner[cell]; }
   WorldId owner_of(const Vec3& position, Step step) const { return owner(grid_.index(grid_.cell_of(position)), step); }
@@ -41,9 +45,18 @@ class Territories {
   bool change_at(Step step) const { return at(step).from == step && step > 0; }
   bool changes_near(std::size_t cell, Step step) const { return change_at(step) && at(step).near_changed[cell]; }
 
-  // Marks worlds that own cells, at any step that is known of, within `range` cells of one that `world` owns then; or
-  // owned either at the step before.
-  void mark_neighbours(WorldId world, int range, std::vector<std::uint8_t>& marked) const;
+  // Whether `world` owns a cell from `step` on, whatever is known to happen.
+  bool keeps(WorldId world, std::size_t cell, Step step) const;
+  // After all that is known.
+  const std::vector<WorldId>& newest() const { return versions_.back().owner; }
+
+  // Lowers since[w] to the first step that is known of at which w owns a cell within `range` cells of one that `world`
+  // owns then; or owned either at the step before.
+  void find_neighbours(WorldId world, int range, std::vector<Step>& since) const;
+
+  // Nothing is asked about steps before this one any more. Transfers are remembered for `memory` steps longer, for
+  // worlds to whom somebody new may have to tell them.
+  void release_before(Step step, Step memory);
 
  private:
   struct Version {
@@ -59,6 +72,7 @@ class Territories {
   WorldId worlds_;
   std::vector<Version> versions_;  // ascending
   std::vector<Transfer> transfers_;
+  std::vector<std::uint32_t> known_;  // by giver
 };
 
 }  // namespace soda::border

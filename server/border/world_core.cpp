@@ -1,17 +1,19 @@
 #include "server/border/world_core.h"
 
 #include <algorithm>
+#include <deque>
 #include <limits>
 #include <map>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "common/state_hash.h"
 #include "server/border/announcer.h"
 #include "server/border/context.h"
+#include "server/border/held_back.h"
 #include "server/border/link.h"
 #include "server/border/settler.h"
+#include "server/border/trade.h"
 
 namespace soda::border {
 
@@ -27,7 +29,9 @@ class WorldCore::Impl final : timeline::Arbiter {
         context_{model_, settings_, neighbourhood_, timeline_, links_, stats_, final_},
         announcer_(context_),
         settler_(context_),
+        trade_(context_, territories_),
         timeline_(model, settings.me, links_.size(), *this) {
+    for (const Link& link : links_) neighbours_.push_back(link.peer());
     timeline_.stepper().timing = settings.measure;
     final_ = 0;  // the scene
     closed_ = settings.actions ? 0 : std::numeric_limits<Step>::max();
@@ -40,37 +44,19 @@ class WorldCore::Impl final : timeline::Arbiter {
       if (h.session != settings_.session)
         throw CodecError("border message of another session (scene, worlds or steps differ)");
       if (h.to != settings_.me) throw CodecError("border message for world " + std::to_string(h.to));
-      Link* link = context_.link_to(h.from);
-      if (!link) throw CodecError("border message from world " + std::to_string(h.from) + ", which is no neighbour");
-      if (h.logged > logged_) return hold_back(h.logged, bytes);
+      Link* const link = context_.link_to(h.from);
+      if (!link || link->since() == Neighbourhood::kNever)
+        throw CodecError("border message from world " + std::to_string(h.from) + ", which is no neighbour");
+      if (h.logged > logged_) {
+        ++stats_.held_back;
+        held_back_.keep(h.logged, bytes);
+        return true;
+      }
       Message message = decode(bytes, model_);
       check(message, settings_.me, territories_.worlds());
       return take(*link, std::move(message));
     } catch (const CodecError& error) {
       return refuse(error);
-    }
-  }
-
-  // It may be of bodies that are not known here yet. What is lost for want of room is asked for again.
-  bool hold_back(ActionNumber logged, std::span<const std::byte> bytes) {
-    constexpr std::size_t kAtMost = 4096, kBytesAtMost = std::size_t{256} << 20;
-    ++stats_.held_back;
-    if (held_messages_ >= kAtMost || held_bytes_ + bytes.size() > kBytesAtMost) return true;
-    held_back_[logged].emplace_back(bytes.begin(), bytes.end());
-    ++held_messages_;
-    held_bytes_ += bytes.size();
-    return true;
-  }
-
-  // Those that presuppose no more than is known now.
-  void receive_held_back() {
-    while (!held_back_.empty() && held_back_.begin()->first <= logged_) {
-      const auto ready = held_back_.extract(held_back_.begin());
-      for (const auto& bytes : ready.mapped()) {
-        --held_messages_;
-        held_bytes_ -= bytes.size();
-        (void)receive(bytes);  // refusals are counted
-      }
     }
   }
 
@@ -123,7 +109,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     deferred_.clear();
     changed();
     close();
-    receive_held_back();
+    held_back_.release(logged_, [&](const auto& bytes) { (void)receive(bytes); });  // refusals are counted
     return true;
   }
 
@@ -208,7 +194,7 @@ class WorldCore::Impl final : timeline::Arbiter {
         if (!settler_.must_wait({&box, 1})) return true;
       } else {
         for (std::size_t source = 0; source < links_.size(); ++source)
-          if (links_[source].upto() >= step && timeline_.heard(source, step)->find(slot)) return true;
+          if (links_[source].reached(step) && timeline_.heard(source, step)->find(slot)) return true;
       }
     }
     if (pending.empty()) return true;  // nothing moves: the step costs nothing
@@ -217,8 +203,10 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   bool may_process(Step step) const {
-    // Of state 0 of the neighbours nothing can be assumed.
-    return context_.all_have_reached(settings_.sync == Sync::kConservative ? step : 0);
+    // Of the first state of a neighbour nothing can be assumed.
+    return std::all_of(links_.begin(), links_.end(), [&](const Link& link) {
+      return link.reached(settings_.sync == Sync::kConservative ? step : std::min(step, link.since()));
+    });
   }
 
   // Something is to be looked at again.
@@ -236,6 +224,11 @@ class WorldCore::Impl final : timeline::Arbiter {
   // ---- what goes out
   std::vector<Outgoing> take_outgoing() {
     const bool waiting = idle_;
+    if (const std::optional<Transfer> transfer = trade_.agreed()) {
+      ++stats_.transfers;
+      stats_.cells_given += transfer->cells.size();
+      learn(*transfer, nullptr);
+    }
     if (!links_.empty() && std::exchange(untold_, false)) {
       const Step now = front();
       announcer_.tell(now);
@@ -251,6 +244,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     std::vector<Outgoing> out;
     std::vector<std::vector<std::byte>> messages;
     for (Link& link : links_) {
+      if (!link.may_send(front())) continue;
       messages.clear();
       const std::uint64_t resent = link.resent();
       link.collect(messages);
@@ -287,7 +281,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   std::vector<WorldId> waiting_for() const {
     std::vector<WorldId> worlds, others;
     for (const Link& link : links_) {
-      const bool behind = link.final_step() < final_ || link.upto() < std::min(timeline_.newest(), settings_.last_step);
+      const bool behind = !link.finished(final_) || !link.reached(std::min(timeline_.newest(), settings_.last_step));
       (behind ? worlds : others).push_back(link.peer());
     }
     // A part that is missing, or word that it is final, may have to come from somebody else: all neighbours are asked.
@@ -334,11 +328,55 @@ class WorldCore::Impl final : timeline::Arbiter {
     return territories;
   }
 
-  std::vector<Link> make_links() const {
-    std::vector<Link> links;
-    for (const WorldId n : neighbourhood_.neighbours())
-      links.emplace_back(settings_.session, settings_.me, settings_.epoch, n);
+  Link make_link(WorldId world, std::size_t index) const {
+    Link link(settings_.session, settings_.me, settings_.epoch, world, index);
+    link.set_since(neighbourhood_.neighbour_since(world));
+    return link;
+  }
+
+  std::deque<Link> make_links() const {
+    std::deque<Link> links;
+    for (WorldId world = 0; world < territories_.worlds(); ++world)
+      if (neighbourhood_.neighbour_since(world) != Neighbourhood::kNever)
+        links.push_back(make_link(world, links.size()));
     return links;
+  }
+
+  // ---- cells that change hands
+  void learn(const Transfer& transfer, const Link* from) {
+    if (!territories_.add(transfer)) return;
+    trade_.learnt(transfer);
+    learnt_.push_back(transfer);
+    for (Link& link : links_)
+      if (&link != from) link.add(transfer);
+    neighbourhood_.territories_change(final_);
+    for (WorldId world = 0; world < territories_.worlds(); ++world) {
+      const Step since = neighbourhood_.neighbour_since(world);
+      if (Link* const link = context_.link_to(world)) {
+        link->set_since(since);
+      } else if (since != Neighbourhood::kNever) {
+        Link& opened = links_.emplace_back(make_link(world, links_.size()));
+        neighbours_.push_back(world);
+        for (const Transfer& known : territories_.transfers()) opened.add(known);
+        timeline_.add_source();
+        announcer_.add_link(timeline_.newest());
+        settler_.add_link();
+        ++stats_.links_opened;
+      }
+    }
+    changed();
+  }
+
+  void check_transfer(const Transfer& transfer) const {
+    const auto fail = [&](const std::string& why) {
+      throw CodecError("transfer " + std::to_string(transfer.number) + " of world " + std::to_string(transfer.giver) +
+                       ": " + why);
+    };
+    if (!settings_.balance) fail("cells do not change hands in this session");
+    if (const std::string why = territories_.fault(transfer); !why.empty()) fail(why);
+    if (transfer.number <= territories_.known(transfer.giver)) return;
+    if (transfer.giver == settings_.me) fail("is not of this world");
+    if (transfer.step <= timeline_.newest()) fail("comes too late");
   }
 
   // ---- Arbiter
@@ -358,14 +396,14 @@ class WorldCore::Impl final : timeline::Arbiter {
 
   void deliver(const Link& link, Message& message) {
     // Final steps of neighbours differ by one at most, and nobody computes beyond its window.
-    const Step horizon = final_ + settings_.window + 2;
+    const Step most_final = std::max(final_ + 1, link.since()), horizon = most_final + settings_.window + 1;
     const auto bounded = [&](Step step, const char* what) {
       if (step < 0 || step > horizon)
         throw CodecError(std::string(what) + ": step " + std::to_string(step) + " cannot be");
     };
     const Header& h = message.header;
     bounded(h.upto, "stream");
-    if (h.near_final < -1 || h.near_final > h.final_step || h.final_step > h.upto || h.final_step > final_ + 1)
+    if (h.near_final < -1 || h.near_final > h.final_step || h.final_step > h.upto || h.final_step > most_final)
       throw CodecError("stream: final steps " + std::to_string(h.final_step) + " and " + std::to_string(h.near_final) +
                        " cannot be");
     for (const Frame& frame : message.frames) {
@@ -375,13 +413,18 @@ class WorldCore::Impl final : timeline::Arbiter {
     }
     for (const Part& part : message.parts) bounded(part.step, "part");
     for (const FinalPart& part : message.finals) bounded(part.step, "final part");
+    if (!settings_.balance && !message.offers.empty()) throw CodecError("offer: cells do not change hands here");
+    for (const Transfer& transfer : message.transfers) {
+      check_transfer(transfer);
+      learn(transfer, &link);  // before what rests on it
+    }
 
     std::vector<Ref<timeline::NearSet>> sets;
     for (const Frame& frame : message.frames) {
       sets.push_back(timeline_.near_set(frame.set, frame.step));
       for (const timeline::NearSet::Body& b : sets.back()->bodies) check_body(*b.record);
     }
-    const std::size_t source = context_.index_of(link);
+    const std::size_t source = link.index();
     for (std::size_t i = 0; i < sets.size(); ++i) {
       const Frame& frame = message.frames[i];
       timeline_.hear(source, frame.step, std::move(sets[i]));
@@ -391,6 +434,9 @@ class WorldCore::Impl final : timeline::Arbiter {
     }
     for (Part& part : message.parts) settler_.part_came(link, std::move(part));
     for (const FinalPart& part : message.finals) settler_.final_part_came(part);
+    for (Offer& offer : message.offers) trade_.offered(link, std::move(offer));
+    for (const Answer& answer : message.answers) trade_.answered(link, answer);
+    if (message.load) loads_[link.peer()] = *message.load;
   }
 
   // What a neighbour may tell of: bodies of this world or of a neighbour, no faster than the scene lets them be.
@@ -428,6 +474,8 @@ class WorldCore::Impl final : timeline::Arbiter {
     timeline_.release_before(keep);
     announcer_.release_before(keep);
     settler_.release_before(keep);
+    const Step ahead = settings_.window + kHops + 2;
+    territories_.release_before(keep, 8 * ahead);
   }
 
   void count(Step step) {
@@ -447,18 +495,21 @@ class WorldCore::Impl final : timeline::Arbiter {
   ActionNumber logged_ = 0;
   Step closed_;                                          // no action comes for steps up to this one
   std::vector<std::pair<Step, ActionNumber>> closings_;  // that presuppose entries of the log which have not come yet
-  std::map<ActionNumber, std::vector<std::vector<std::byte>>> held_back_;  // messages, by what they presuppose
-  std::size_t held_messages_ = 0, held_bytes_ = 0;
+  HeldBack held_back_;
   bool begun_ = false;
   std::map<Step, std::size_t> deferred_;  // steps that were not worth doing, with so many pending bodies
   bool idle_ = false;                     // nothing can be done before something comes
   bool untold_ = true;                    // something has changed since it was last looked at what to tell
   mutable std::optional<Step> front_;     // as long as nothing changes
   Neighbourhood neighbourhood_;
-  std::vector<Link> links_;
+  std::deque<Link> links_;
+  std::vector<WorldId> neighbours_;  // by link
+  std::vector<Transfer> learnt_;     // that nobody has taken notice of yet
+  std::map<WorldId, Load> loads_;
   Context context_;
   Announcer announcer_;
   Settler settler_;
+  Trade trade_;
   timeline::Timeline timeline_;
 };
 
@@ -472,12 +523,29 @@ bool WorldCore::act(const LoggedAction& action) { return impl_->act(action); }
 void WorldCore::close_actions(Step step, ActionNumber logged) { impl_->close_actions(step, logged); }
 ActionNumber WorldCore::logged() const { return impl_->logged_; }
 void WorldCore::set_limit(Step newest) { impl_->set_limit(newest); }
+bool WorldCore::give(WorldId taker, std::vector<std::uint32_t> cells, double cost) {
+  return impl_->settings_.balance && impl_->trade_.offer(taker, std::move(cells), cost);
+}
+bool WorldCore::offering() const { return impl_->trade_.offering(); }
+bool WorldCore::has_cell(std::size_t cell) const {
+  return impl_->territories_.owner(cell, clock()) == impl_->settings_.me;
+}
+bool WorldCore::giving() const { return impl_->trade_.giving(); }
+bool WorldCore::may_give(std::size_t cell) const { return impl_->trade_.may_give(cell); }
+std::vector<Asked> WorldCore::take_offers() { return impl_->trade_.take_offers(); }
+void WorldCore::answer(const Asked& asked, bool accept) { impl_->trade_.answer(asked, accept); }
+std::vector<WorldId> WorldCore::owners_ahead() const { return impl_->trade_.owners_ahead(); }
+std::vector<Transfer> WorldCore::take_transfers() { return std::exchange(impl_->learnt_, {}); }
+void WorldCore::tell_load(const Load& load) {
+  for (Link& link : impl_->links_) link.add(load);
+}
+const std::map<WorldId, Load>& WorldCore::loads() const { return impl_->loads_; }
 Progress WorldCore::work() { return impl_->work(); }
 std::vector<Outgoing> WorldCore::take_outgoing() { return impl_->take_outgoing(); }
 Step WorldCore::clock() const { return impl_->timeline_.newest(); }
 Step WorldCore::front() const { return impl_->front(); }
 Step WorldCore::final_step() const { return impl_->final_; }
-const std::vector<WorldId>& WorldCore::neighbours() const { return impl_->neighbourhood_.neighbours(); }
+const std::vector<WorldId>& WorldCore::neighbours() const { return impl_->neighbours_; }
 std::vector<WorldId> WorldCore::waiting_for() const { return impl_->waiting_for(); }
 std::string WorldCore::why_not_final() const { return impl_->why_not_final(); }
 Step WorldCore::oldest() const { return impl_->timeline_.oldest(); }

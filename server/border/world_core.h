@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -18,6 +19,7 @@
 #include "common/body_set.h"
 #include "common/ids.h"
 #include "common/territory.h"
+#include "server/border/message.h"
 #include "server/border/territories.h"
 #include "server/physics/model.h"
 #include "server/timeline/timeline.h"
@@ -36,6 +38,7 @@ struct CoreSettings {
   Step window = 48;                      // K: steps beyond the final one that may be computed
   bool measure = false;                  // keep the CPU time of CoreStats::shares
   std::vector<Transfer> transfers = {};  // of cells, that all worlds know of from the start
+  bool balance = false;                  // cells may change hands while the session runs
   bool actions = false;  // no step becomes final before close_actions() has said that nothing will be done at it
 };
 
@@ -58,7 +61,10 @@ struct CoreStats {
   std::uint64_t actions = 0;      // entries of the action log acted on
   std::uint64_t held_back = 0;    // messages that came before actions which they presuppose
   std::uint64_t anticipated = 0;  // steps computed before all neighbours were known to have reached them
-  physics::ModelShares shares;    // how islands were solved
+  std::uint64_t offers = 0, offers_declined = 0;  // of cells, made by this world
+  std::uint64_t transfers = 0, cells_given = 0;   // by this world, while the session runs
+  std::uint64_t links_opened = 0;                 // to worlds that became neighbours while the session runs
+  physics::ModelShares shares;                    // how islands were solved
   timeline::TimelineStats timeline;
 };
 
@@ -123,6 +129,24 @@ class WorldCore {
   void close_actions(Step step, ActionNumber logged);
   ActionNumber logged() const;
 
+  // ---- cells that change hands: see trade.h
+  // Asks a neighbour to take cells, ascending. False, and nothing has happened: some cannot be given, the two are not
+  // neighbours yet, or something is being given already.
+  bool give(WorldId taker, std::vector<std::uint32_t> cells, double cost = 0);
+  bool offering() const;  // an offer has not been answered yet
+  bool giving() const;    // or what was accepted is not the taker's yet at final steps
+  bool may_give(std::size_t cell) const;
+  bool has_cell(std::size_t cell) const;  // at the clock
+  // What neighbours would like to give since the last call, each to be answered.
+  std::vector<Asked> take_offers();
+  void answer(const Asked& asked, bool accept);
+  // By cell: owners after all that is known and agreed.
+  std::vector<WorldId> owners_ahead() const;
+  // Transfers that have become known since the last call.
+  std::vector<Transfer> take_transfers();
+  void tell_load(const Load& load);              // to all neighbours
+  const std::map<WorldId, Load>& loads() const;  // what neighbours told last
+
   // ---- work: at most one step's worth, then returns
   Progress work();
 
@@ -132,7 +156,7 @@ class WorldCore {
   Step clock() const;       // newest step computed
   Step front() const;       // everything up to this step is computed, and nothing of it is to be done again
   Step final_step() const;  // newest step that can never change
-  const std::vector<WorldId>& neighbours() const;
+  const std::vector<WorldId>& neighbours() const;  // may grow, at the end, while cells change hands
   // Neighbours whose messages the next piece of work lacks, or may lack: those first who are behind.
   std::vector<WorldId> waiting_for() const;
   std::string why_not_final() const;  // what the next final step lacks, in words, for logs

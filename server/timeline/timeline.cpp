@@ -103,6 +103,12 @@ void Timeline::release_before(Step step) {
 
 // ---- what others tell ----------------------------------------------------------------------------------------------
 
+void Timeline::add_source() {
+  told_.emplace_back();
+  const Ref<NearSet> nothing(new NearSet);
+  for (Entry& entry : entries_) entry.heard.push_back(nothing);
+}
+
 void Timeline::hear(std::size_t source, Step step, Ref<NearSet> set) {
   Ref<NearSet>& told = told_[source][step];
   told = std::move(set);

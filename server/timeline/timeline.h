@@ -97,6 +97,8 @@ class Timeline {
   Step oldest() const { return base_; }
   Step newest() const { return base_ + static_cast<Step>(entries_.size()) - 1; }
 
+  // One more source, which has produced nothing so far that matters here.
+  void add_source();
   // `source` produced these bodies at `step`, and no others that matter here. For steps to come, too.
   void hear(std::size_t source, Step step, Ref<NearSet> set);
   Ref<NearSet> near_set(const BodySet& set, Step step) const;  // of bodies received

@@ -59,7 +59,7 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core.actions = true;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
-  lines_.resize(core_->neighbours().size());
+  lines_.resize(settings.worlds);
   transport_.open(core_->neighbours());
 }
 
@@ -127,12 +127,6 @@ void Daemon::stop() {
   transport_.wake();
 }
 
-Daemon::Line& Daemon::line(WorldId neighbour) {
-  const auto& all = core_->neighbours();
-  const auto at = std::find(all.begin(), all.end(), neighbour) - all.begin();
-  return lines_.at(static_cast<std::size_t>(at));
-}
-
 bool Daemon::receive_all() {
   bool any = false;
   while (auto incoming = transport_.receive()) {
@@ -147,7 +141,7 @@ bool Daemon::receive_all() {
         spdlog::warn("refused a message of {} bytes from world {}: {} (refusal {})", incoming->bytes.size(),
                      incoming->from, core_->last_refusal(), refusals_);
     } else {
-      Line& from = line(incoming->from);
+      Line& from = lines_.at(incoming->from);
       from.heard = Clock::now();
       from.patience = kPatience;
     }
@@ -162,7 +156,7 @@ void Daemon::send_all() {
 void Daemon::ask_the_silent(Clock::time_point now) {
   bool asked = false;
   for (const WorldId neighbour : core_->waiting_for()) {
-    Line& from = line(neighbour);
+    Line& from = lines_.at(neighbour);
     if (now - from.heard < from.patience) continue;
     spdlog::debug("nothing came from world {} for {:.1f} s; asking again", neighbour, seconds(from.patience));
     from.heard = now;

@@ -76,7 +76,6 @@ class Daemon {
   void idle(border::Progress progress, std::chrono::milliseconds at_most);
   void act_all();
   wire::Status status() const;
-  Line& line(WorldId neighbour);
 
   const DaemonSettings settings_;
   Transport& transport_;
@@ -86,7 +85,7 @@ class Daemon {
   ViewFeed feed_;
   Recorder recorder_;
   std::unique_ptr<border::WorldCore> core_;
-  std::vector<Line> lines_;  // by position in core_->neighbours()
+  std::vector<Line> lines_;  // by world
 
   std::atomic<Step> limit_{-1};                   // -1: not started
   std::mutex actions_mutex_;                      // guards what follows

@@ -44,6 +44,10 @@ class Messages : public testing::Test {
                               .revision = {1, 0},
                               .components = {std::make_shared<const border::Component>(component),
                                              std::make_shared<const border::Component>()}});
+    message_.transfers = {{1, 1, 180, 0, {2, 3, 9}}, {2, 4, 200, 1, {7}}};
+    message_.offers = {{3, 0.01, {4, 5}}};
+    message_.answers = {{8, true}, {9, false}};
+    message_.load = {0.01, 0.02, std::numeric_limits<double>::infinity()};
   }
 
   physics::Model model_;
@@ -60,6 +64,72 @@ TEST_F(Messages, ComeBackBitForBit) {
   EXPECT_TRUE(same(back.frames[0].set, message_.frames[0].set));
   ASSERT_EQ(back.parts[0].components.size(), 2u);
   EXPECT_EQ(back.parts[0].components[0]->ports[1].record, 98u);
+  EXPECT_EQ(back.transfers, message_.transfers);
+  ASSERT_EQ(back.offers.size(), 1u);
+  EXPECT_EQ(back.offers[0].cells, (std::vector<std::uint32_t>{4, 5}));
+  ASSERT_EQ(back.answers.size(), 2u);
+  EXPECT_TRUE(back.answers[0].accepted && !back.answers[1].accepted);
+  ASSERT_TRUE(back.load);
+  EXPECT_EQ(back.load->expected, 0.02);
+}
+
+TEST_F(Messages, WithBadCellsOrLoadsAreRefused) {
+  const auto refusal = [&](auto&& spoil) {
+    Message bad = message_;
+    spoil(bad);
+    try {
+      border::decode(border::encode(bad), model_);
+    } catch (const CodecError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(refusal([](Message&) {}), "accepted");
+  EXPECT_EQ(refusal([](Message& m) { m.transfers[0].cells = {3, 2}; }), "cells: out of order");
+  EXPECT_EQ(refusal([](Message& m) { m.offers[0].cells.clear(); }), "cells: none");
+  EXPECT_EQ(refusal([](Message& m) { m.offers[0].cost = -1; }), "offer: its cost cannot be");
+  EXPECT_EQ(refusal([](Message& m) { m.load->work = -1; }), "load: cannot be");
+  EXPECT_EQ(refusal([](Message& m) { m.load->expected = std::numeric_limits<double>::infinity(); }), "load: cannot be");
+  EXPECT_EQ(refusal([](Message& m) { m.load->on_time = std::numeric_limits<double>::quiet_NaN(); }), "load: cannot be");
+}
+
+// What another world may say of territories: only what it may give, once, in order, in time.
+TEST_F(Messages, OfTransfersThatCannotBeAreRefused) {
+  const Scene& scene = model_.scene();
+  const TerritoryMap map = bisect(scene, make_grid(scene), 2);
+  border::Observer nobody;
+  border::WorldCore world(model_, map, {.me = 0, .epoch = 1, .session = 7, .last_step = 1000, .balance = true}, nobody);
+  const auto owned_by = [&](WorldId w) {
+    return static_cast<std::uint32_t>(std::find(map.owner.begin(), map.owner.end(), w) - map.owner.begin());
+  };
+  Message message;
+  message.header = {.session = 7, .from = 1, .to = 0, .epoch = 1, .sequence = 1};
+  const auto refusal = [&](const border::Transfer& transfer) {
+    message.transfers = {transfer};
+    EXPECT_FALSE(world.receive(border::encode(message)));
+    return world.last_refusal();
+  };
+  const std::uint32_t mine = owned_by(0), its = owned_by(1);
+  EXPECT_NE(refusal({1, 1, 100, 0, {mine}}).find("is not its giver's"), std::string::npos);
+  EXPECT_NE(refusal({1, 2, 100, 0, {its}}).find("others of its giver"), std::string::npos);
+  EXPECT_NE(refusal({1, 1, 0, 0, {its}}).find("past"), std::string::npos);
+  EXPECT_NE(refusal({1, 1, 100, 7, {its}}).find("such worlds"), std::string::npos);
+  EXPECT_NE(refusal({1, 1, 100, 0, {99999}}).find("no cell 99999"), std::string::npos);
+  EXPECT_NE(refusal({0, 1, 100, 1, {mine}}).find("is not of this world"), std::string::npos);
+  message.transfers = {{1, 1, 100, 0, {its}}};
+  EXPECT_TRUE(world.receive(border::encode(message))) << world.last_refusal();
+  EXPECT_EQ(world.owners_ahead()[its], 0u);
+  EXPECT_EQ(world.take_transfers().size(), 1u);
+  EXPECT_FALSE(world.may_give(its)) << "not before it is this world's at the final step";
+  message.header.sequence = 2;
+  EXPECT_TRUE(world.receive(border::encode(message))) << "said again";
+  EXPECT_TRUE(world.take_transfers().empty());
+
+  border::WorldCore fixed(model_, map, {.me = 0, .epoch = 1, .session = 7, .last_step = 1000}, nobody);
+  message.header.sequence = 1;
+  EXPECT_FALSE(fixed.receive(border::encode(message)));
+  EXPECT_NE(fixed.last_refusal().find("do not change hands"), std::string::npos);
+  EXPECT_FALSE(fixed.give(1, {mine}));
 }
 
 TEST_F(Messages, CutShortAnywhereAreRefused) {
@@ -170,7 +240,7 @@ TEST_F(Messages, OfOthersChangeNothing) {
 }
 
 TEST(Link, DeliversInOrderAndRepeatsWhatWasLost) {
-  border::Link out(1, 0, 1, 1), in(1, 1, 1, 0);
+  border::Link out(1, 0, 1, 1, 0), in(1, 1, 1, 0, 0);
   const physics::Model model(hard_scene("corner").make());
   std::vector<std::vector<std::byte>> sent;
   for (Step t = 0; t < 5; ++t) out.send(t, t - 1, t - 2, 0, sent);
@@ -212,7 +282,7 @@ TEST(FrameBook, TellsWhatTheOtherSideWouldNotAssume) {
     return all;
   };
   const border::NearBody one = near(1, true), two = near(2, true), three = near(3, false);
-  border::FrameBook book;
+  border::FrameBook book(0);
   book.extend();
   book.set(0, {one, two, three});
   std::vector<border::Frame> frames = book.tell(0, 1);

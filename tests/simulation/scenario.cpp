@@ -69,6 +69,7 @@ std::vector<border::Transfer> random_transfers(const Scene& scene, WorldId world
   for (std::uint64_t i = 0; i < count; ++i)
     when.push_back(1 + static_cast<Step>(random() % static_cast<std::uint64_t>(steps)));
   std::sort(when.begin(), when.end());
+  when.erase(std::unique(when.begin(), when.end()), when.end());  // cells go on at a later step only
   for (const Step step : when) {
     border::Transfer t;
     t.step = step;
@@ -76,12 +77,13 @@ std::vector<border::Transfer> random_transfers(const Scene& scene, WorldId world
     const Body& body = scene.bodies[random() % scene.bodies.size()];
     t.giver = now[grid.index(grid.cell_of(body.pose.position))];
     t.taker = (t.giver + 1 + static_cast<WorldId>(random() % (worlds - 1))) % worlds;
-    t.number = ++numbers[t.giver];
     const auto share = std::vector<std::uint64_t>{1, 2, 10}[random() % 3];  // one in so many of the giver's cells
     for (std::uint32_t cell = 0; cell < now.size(); ++cell)
       if (now[cell] == t.giver && random() % share == 0) t.cells.push_back(cell);
     for (const std::uint32_t cell : t.cells) now[cell] = t.taker;
-    if (!t.cells.empty()) transfers.push_back(t);
+    if (t.cells.empty()) continue;
+    t.number = ++numbers[t.giver];
+    transfers.push_back(t);
   }
   return transfers;
 }
@@ -114,6 +116,7 @@ Scenario scenario_of(std::uint64_t seed) {
   if (const auto kind = random() % 6; kind >= 2)
     s.actions = random_actions(scene, s.steps, 1 + random() % 12, kind >= 4, seed);
   if (seed % 2 == 0) s.transfers = random_transfers(scene, s.worlds, s.owner, s.steps, seed);
+  if (seed % 8 == 3 || seed % 8 == 5) s.network.give_share = seed % 16 < 8 ? 0.002 : 0.05;
   return s;
 }
 
@@ -125,7 +128,8 @@ std::string Scenario::text() const {
          share(network.double_share) + ", lost " + share(network.loss_share) + ", stalled " +
          share(network.stall_share) + ", touched " + share(network.touch_share) + ", lead " +
          std::to_string(network.lead) + ", " + std::to_string(actions.size()) + " actions, " +
-         std::to_string(transfers.size()) + " transfers";
+         std::to_string(transfers.size()) + " transfers" +
+         (network.give_share > 0 ? ", cells given " + share(network.give_share) : "");
 }
 
 SessionResult run_scenario(const Scenario& s) {

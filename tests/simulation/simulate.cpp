@@ -85,6 +85,9 @@ int main(int argc, char** argv) {
       {"islands mixed", s.mixed_islands},
       {"bodies that changed worlds", s.arrived},
       {"bodies handed over with their cells", s.timeline.handed_over},
+      {"cells given while it ran", s.cells_given},
+      {"offers of cells declined", s.offers_declined},
+      {"links opened while it ran", s.links_opened},
       {"wide bodies told", s.wide_bodies},
   };
   bool all = true;

@@ -110,6 +110,7 @@ class Session {
       : scene_(scene),
         network_(network),
         random_(network.seed),
+        trade_random_(network.seed + 4711),
         digests_(worlds),
         slowness_(worlds),
         service_(log, network, worlds) {
@@ -125,6 +126,7 @@ class Session {
                                                                                 .sync = network.sync,
                                                                                 .window = network.window,
                                                                                 .transfers = transfers,
+                                                                                .balance = network.give_share > 0,
                                                                                 .actions = true},
                                                            digests_[w]));
       slowness_[w] = uniform() * network.stall_share;
@@ -153,6 +155,7 @@ class Session {
           return fail("world " + std::to_string(w) + " would not find a body that it knows");
         if (network_.touch_share > 0 && progress[w] != border::Progress::kWorked && uniform() < network_.touch_share)
           if (!touch(*cores_[w])) return fail(result_.failure);
+        if (network_.give_share > 0) trade(*cores_[w]);
         for (border::Outgoing& out : cores_[w]->take_outgoing()) post(now, out);
       }
       const bool done = std::all_of(progress.begin(), progress.end(),
@@ -183,6 +186,19 @@ class Session {
 
  private:
   double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
+
+  // Some cells to some neighbour, which mostly takes them.
+  void trade(border::WorldCore& core) {
+    for (const border::Asked& asked : core.take_offers()) core.answer(asked, trade_random_() % 5 != 0);
+    const double now = static_cast<double>(trade_random_() >> 11) * 0x1p-53;
+    if (now >= network_.give_share || core.giving() || core.neighbours().empty()) return;
+    const WorldId taker = core.neighbours()[trade_random_() % core.neighbours().size()];
+    const auto one_in = std::vector<std::uint64_t>{1, 2, 10}[trade_random_() % 3];
+    std::vector<std::uint32_t> cells;
+    for (std::uint32_t cell = 0; cell < map_.grid.cells(); ++cell)
+      if (core.may_give(cell) && trade_random_() % one_in == 0) cells.push_back(cell);
+    core.give(taker, std::move(cells));
+  }
 
   // A repair of what has not changed must leave every step as it is, byte by byte.
   bool touch(border::WorldCore& core) {
@@ -248,7 +264,7 @@ class Session {
   const Scene& scene_;
   NetworkSettings network_;
   TerritoryMap map_;
-  std::mt19937_64 random_;
+  std::mt19937_64 random_, trade_random_;
   std::vector<Digests> digests_;
   std::vector<std::unique_ptr<physics::Model>> models_;
   std::vector<std::unique_ptr<border::WorldCore>> cores_;
@@ -279,6 +295,11 @@ void add(border::CoreStats& sum, const border::CoreStats& s) {
   sum.refused += s.refused;
   sum.anticipated += s.anticipated;
   sum.actions += s.actions;
+  sum.offers += s.offers;
+  sum.offers_declined += s.offers_declined;
+  sum.transfers += s.transfers;
+  sum.cells_given += s.cells_given;
+  sum.links_opened += s.links_opened;
   sum.held_back += s.held_back;
   sum.timeline.bodies_computed += s.timeline.bodies_computed;
   sum.timeline.bodies_redone += s.timeline.bodies_redone;

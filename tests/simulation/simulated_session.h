@@ -30,6 +30,7 @@ struct NetworkSettings {
   double stall_share = 0.5;    // of ticks in which a world does nothing
   Step lead = 4;               // steps beyond the slowest final one up to which the session closes actions
   double touch_share = 0;      // of ticks in which a world at rest repairs a random step where nothing has changed
+  double give_share = 0;       // of ticks in which a world offers some of its cells to a neighbour
 };
 
 struct SessionResult {

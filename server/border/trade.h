@@ -1,0 +1,77 @@
+// How cells change hands while a session runs, without anybody in the middle.
+//
+// A giver offers cells of its own to a neighbour, one offer at a time, and keeps them until that one has answered. What
+// has been accepted becomes a transfer at step T, which the giver tells all its neighbours within the streams, and they
+// theirs. Nobody has to answer, for news of a transfer travel ahead of what is final: a world's state t + 1 is final
+// only when it has heard that its neighbours' states t are, and in a stream the transfer comes before whatever becomes
+// final after it. So a world h neighbours away knows it before its own final step is beyond F + h, with F the giver's
+// when it was told, and before its clock, which is at most K beyond that, is beyond F + h + K. With
+//   T = F + K + kHops + 2
+// whoever is within kHops has not computed state T yet. Those are all to whom it matters: a world asks only whom cells
+// within five of its own, or its neighbours', belong to (three hops at most, since worlds within two cells are
+// neighbours), and who has just taken such cells had them from a neighbour (one more). The longest chain of takers
+// grows by a hop in no less than K steps, while news travel a hop a step: they are never overtaken.
+//
+// The same holds for worlds that become neighbours at T: when one of them, having reached T, first speaks to the other,
+// that one knows of it.
+//
+// News of two transfers of which one rests on the other cannot come in the wrong order: who made the second knew the
+// first, and told it first.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "server/border/context.h"
+#include "server/border/message.h"
+#include "server/border/territories.h"
+
+namespace soda::border {
+
+constexpr Step kHops = 6;
+
+class Trade {
+ public:
+  Trade(const Context& context, const Territories& territories) : context_(context), territories_(territories) {}
+
+  // ---- to give
+  // Whether this world has the cell, and keeps it, by all that is known.
+  bool may_give(std::size_t cell) const;
+  // Offers cells, ascending, to a neighbour. False, and nothing has happened: some may not be given, `taker` is no
+  // neighbour yet, or something is being given already.
+  bool offer(WorldId taker, std::vector<std::uint32_t> cells, double cost);
+  bool offering() const { return offered_.has_value(); }  // something has been offered, and is not a transfer yet
+  bool giving() const;                                    // or it is, and not the taker's yet, at final steps
+  void answered(const Link& from, const Answer& answer);
+  // What has been accepted, as a transfer that is to be told before anything else becomes final.
+  std::optional<Transfer> agreed();
+
+  // ---- to take
+  void offered(const Link& from, Offer offer);
+  std::vector<Asked> take_offers() { return std::exchange(asked_, {}); }
+  void answer(const Asked& asked, bool accept);
+
+  // A transfer has become known.
+  void learnt(const Transfer& transfer);
+  // Owners after all that is known, and after what this world has been promised.
+  std::vector<WorldId> owners_ahead() const;
+
+ private:
+  struct Offered {
+    WorldId taker = 0;
+    std::uint32_t number = 0;
+    std::vector<std::uint32_t> cells;
+    bool accepted = false;
+  };
+  const Context& context_;
+  const Territories& territories_;
+  std::optional<Offered> offered_;
+  std::uint32_t offers_ = 0;
+  Step given_at_ = -1;           // step of this world's newest transfer
+  std::vector<Asked> asked_;     // not answered yet
+  std::vector<Asked> promised_;  // accepted, and not known as a transfer yet
+};
+
+}  // namespace soda::border
