@@ -32,6 +32,8 @@ struct GrowthRequest {
 
 class Growth {
  public:
+  explicit Growth(const GrowthSettings& settings = {}) : settings_(settings) {}
+
   // The cells, ascending; empty where nothing can be given. `cost_given`: s per step, of all of them.
   std::vector<std::uint32_t> grow(const GrowthRequest& request, double& cost_given);
 
@@ -54,9 +56,6 @@ class Growth {
   std::vector<std::uint32_t> chosen_;
   Direction direction_;
   double unit_ = 0;  // s per step, of the mean cell that costs anything
-
- public:
-  explicit Growth(const GrowthSettings& settings = {}) : settings_(settings) {}
 };
 
 }  // namespace soda::balance

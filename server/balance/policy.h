@@ -73,7 +73,7 @@ struct Settings {
 // what is proportional to the world's own cells.
 class Policy {
  public:
-  explicit Policy(const Settings& settings = {}) : settings_(settings) {}
+  explicit Policy(const Settings& settings = {}) : settings_(settings), growth_(settings.growth) {}
 
   // What to give, if anything. Called some times per second while no transfer of this world is in flight. O(own cells),
   // and O(cells given x log) for what is proposed. The same calls give the same answers: ties go to the lower id, and

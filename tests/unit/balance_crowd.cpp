@@ -21,27 +21,25 @@ double uniform(std::uint64_t seed) { return (static_cast<double>(mixed(seed) >> 
 double gaussian(std::uint64_t seed) {
   return std::sqrt(-2 * std::log(uniform(2 * seed))) * std::cos(2 * M_PI * uniform(2 * seed + 1));
 }
-// Between two walls at 0 and `size`, which throw back.
-double between_walls(double x, double size) {
-  x = std::fmod(std::abs(x), 2 * size);
-  return x < size ? x : 2 * size - x;
-}
-
 }  // namespace
 
-Walk walking_crowd(const Grid& grid, std::size_t bodies, double spread, const Vec3& from, const Vec3& to,
-                   double seconds) {
+Walk walking_crowd(const Grid& grid, std::size_t bodies, double spread, double radius, double seconds) {
   std::vector<Vec3> offset(bodies);
-  for (std::size_t b = 0; b < bodies; ++b)
-    offset[b] = Vec3(spread * gaussian(3 * b), spread * gaussian(3 * b + 1), gaussian(3 * b + 2));
+  std::uint64_t seed = 0;
+  const auto within = [&](double deviation, double most) {
+    for (;;)
+      if (const double x = deviation * gaussian(seed++); std::abs(x) < most) return x;
+  };
+  for (Vec3& o : offset) {
+    o.x() = within(spread, radius);
+    o.y() = within(spread, radius);
+    o.z() = std::abs(within(1, grid.size[2]));
+  }
+  const Vec3 from(radius, radius, 0), to(grid.size[0] - radius, grid.size[1] - radius, 0);
   return [=](std::size_t b, double time) -> Vec3 {
-    if (b >= bodies) {  // those that stand
-      const Cell c = cell_at(grid, b - bodies);
-      return {c[0] + 0.5, c[1] + 0.5, c[2] + 0.5};
-    }
-    Vec3 p = from + (to - from) * std::min(time / seconds, 1.0) + offset[b];
-    for (int axis = 0; axis < 3; ++axis) p[axis] = between_walls(p[axis], grid.size[static_cast<std::size_t>(axis)]);
-    return p;
+    if (b < bodies) return from + (to - from) * std::min(time / seconds, 1.0) + offset[b];
+    const Cell c = cell_at(grid, b - bodies);  // those that stand
+    return {c[0] + 0.5, c[1] + 0.5, c[2] + 0.5};
   };
 }
 
@@ -86,18 +84,18 @@ void CrowdSession::move() {
 // go on as they do.
 void CrowdSession::forecast() {
   for (auto& cost : expected_cost_) std::fill(cost.begin(), cost.end(), 0);
-  constexpr double kMoment = 0.05, kAhead = static_cast<double>(kUntilEffect) * kDt;
+  constexpr double kMoment = 0.05;
   for (std::size_t b = 0; b < o_.bodies; ++b) {
     const double time = static_cast<double>(now_) * kDt;
     const Vec3 at = o_.walk(b, time);
     const Vec3 then = o_.foresight && time > kMoment
-                          ? Vec3(at + (at - o_.walk(b, time - kMoment)) * (kAhead / kMoment))
+                          ? Vec3(at + (at - o_.walk(b, time - kMoment)) * (o_.horizon / kMoment))
                           : at;
     const std::size_t goal = o_.grid.index(o_.grid.cell_of(then));
     const WorldId w = agreed_[goal];
     bool known = false;
     for (int corner = 0; corner < 9 && !known; ++corner) {
-      const Vec3 near = at + 0.5 * Vec3(corner % 3 - 1, corner / 3 - 1, 0);
+      const Vec3 near = at + o_.speed_known * Vec3(corner % 3 - 1, corner / 3 - 1, 0);
       const std::size_t cell = o_.grid.index(o_.grid.cell_of(near));
       known = owner_[cell] == w || agreed_[cell] == w;
     }
@@ -123,7 +121,7 @@ void CrowdSession::apply() {
 }
 
 void CrowdSession::decide(WorldId world) {
-  const bool busy = std::any_of(flying_.begin(), flying_.end(), [&](const Transfer& t) { return t.giver == world; });
+  const bool busy = std::any_of(flying_.begin(), flying_.end(), [&](const Transfer& t) { return t.giver == world && now_ < t.agreed + o_.in_flight; });
   if (!o_.balancing || busy || reports_.size() * kEvery <= kDelay) return;
   const auto& known = reports_[reports_.size() - 1 - kDelay / kEvery];
   std::vector<std::uint32_t> mine;
@@ -163,7 +161,7 @@ void CrowdSession::decide(WorldId world) {
   ++transfers_;
   cells_moved_ += proposal->cells.size();
   last_transfer_ = now_;
-  flying_.push_back({now_ + kUntilEffect, world, proposal->taker, proposal->cells, proposal->cost});
+  flying_.push_back({now_ + kUntilEffect, now_, world, proposal->taker, proposal->cells, proposal->cost});
   check("when agreed, step", agreed_);
 }
 

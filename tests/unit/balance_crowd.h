@@ -31,6 +31,9 @@ struct CrowdOptions {
   double window = 48;       // steps that a world may be ahead of what is displayed
   bool balancing = true;
   bool foresight = true;    // costs are where bodies are heading, else where they are
+  double horizon = 1;       // s, of foresight
+  Step in_flight = 60;      // steps after an agreement until the giver may make the next
+  double speed_known = 0.5; // cells about a world from which it knows of bodies
   Settings settings;
 };
 
@@ -62,7 +65,7 @@ class CrowdSession {
 
  private:
   struct Transfer {
-    Step step;
+    Step step, agreed;
     WorldId giver, taker;
     std::vector<std::uint32_t> cells;
     double cost;
@@ -98,9 +101,10 @@ class CrowdSession {
   std::uint64_t random_ = 1;
 };
 
-// `bodies` in a Gaussian blob of `spread` cells (upright: a half one of one cell, on the ground) that walks from `from` to
-// `to` in `seconds` and stays there, held back by the grid's walls; and one that stands in each cell.
-Walk walking_crowd(const Grid& grid, std::size_t bodies, double spread, const Vec3& from, const Vec3& to, double seconds);
+// `bodies` in a crowd that walks from one corner of the grid to the other in `seconds` and stays there: a Gaussian blob of
+// `spread` cells, cut off at `radius` cells from its middle along x and y, with which it starts at the grid's edges and
+// stops there; upright half a Gaussian of one cell, on the ground. And one body that stands in each cell.
+Walk walking_crowd(const Grid& grid, std::size_t bodies, double spread, double radius, double seconds);
 
 // Territories as a session starts with: bisection by where the bodies are at time 0.
 std::vector<WorldId> bisected(const CrowdOptions& options);
