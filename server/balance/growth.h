@@ -14,8 +14,8 @@ namespace soda::balance {
 
 struct GrowthSettings {
   double density = 1;  // weight of a border face between cells of the territory's mean cost; an empty one's is 1
-  double sweep = 0.3;  // faces that a cell further from the giver's load may cost less than one a cell nearer to it
-  double slack = 0.2;  // of the cost reached, what is left out for a shorter border
+  double sweep = 0.5;  // faces that a cell further from the giver's load may cost less than one a cell nearer to it
+  double slack = 0.1;  // of the cost reached, what is left out for a shorter border
 };
 
 struct GrowthRequest {
@@ -46,16 +46,26 @@ class Growth {
   struct Direction {
     Vec3 from = Vec3::Zero(), towards = Vec3::Zero();  // cells; unit, or zero
   };
+  struct Reached {  // after some of the cells: what may be stopped at
+    std::size_t cells;
+    double cost, border;
+  };
   Direction sweep_direction(const GrowthRequest& r) const;
+  bool is_left(const GrowthRequest& r, std::size_t cell) const;  // the giver's, and not chosen
   double border_growth(const GrowthRequest& r, std::size_t cell) const;
+  double score(const GrowthRequest& r, std::size_t cell) const;
   void consider(const GrowthRequest& r, std::size_t cell);
+  void choose(const GrowthRequest& r, std::uint32_t cell);
+  bool choose_with_rest(const GrowthRequest& r, std::uint32_t cell);
 
   GrowthSettings settings_;
   std::vector<std::uint8_t> state_;  // by cell, bits
-  std::vector<Candidate> heap_;
-  std::vector<std::uint32_t> chosen_;
+  std::vector<Candidate> heap_, blocked_;
+  std::vector<std::uint32_t> chosen_, rest_;
+  std::vector<Reached> reached_;
   Direction direction_;
-  double unit_ = 0;  // s per step, of the mean cell that costs anything
+  double unit_ = 0;                // s per step, of the cell in which the giver's cost is on average
+  double given_ = 0, border_ = 0;  // s per step; weighted faces that the border between the two has grown by
 };
 
 }  // namespace soda::balance

@@ -56,7 +56,7 @@ struct Settings {
   // A taker has at most this part of the giver's load: what differs less is noise, and moving it is not worth the work.
   double dead_band = 1 / 1.1;
   // Of the difference of two loads, what is given: half of it would make them equal, were they known exactly.
-  double share = 0.45;
+  double share = 0.5;
   double least_part = 0.02;   // of the giver's load: a transfer that carries less is not worth its messages
   double least_cost = 10e-6;  // s per step, likewise
   // Steps until a transfer has taken effect: the window, and what agreeing on it takes. A world that will be on time for
@@ -64,7 +64,7 @@ struct Settings {
   double transfer_steps = 48 + 8;
   double patience = 2;
   Step keep = 240;             // steps for which a cell is not given back to whom it came from
-  Step refused = 30;           // steps for which a world that refused is not asked again
+  Step refused = 15;           // steps for which a world that refused is not asked again
   std::size_t max_cells = 1024;  // of one transfer
   GrowthSettings growth;
 };
