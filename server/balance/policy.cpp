@@ -24,7 +24,7 @@ bool Policy::must_give(const Situation& s) const {
 
 void Policy::forget(Step now) {
   std::erase_if(kept_, [&](const Kept& k) { return k.until <= now; });
-  std::erase_if(refusals_, [&](const Refusal& r) { return r.until <= now; });
+  std::erase_if(answers_, [&](const Answer& a) { return a.until <= now; });
 }
 
 std::optional<Proposal> Policy::propose(const Situation& s) {
@@ -32,10 +32,13 @@ std::optional<Proposal> Policy::propose(const Situation& s) {
   const double load = s.load.expected;
   if (!sensible(load) || load <= settings_.least_cost || s.mine.size() < 2 || !must_give(s)) return std::nullopt;
   ranked_.clear();
-  for (const Neighbour& n : s.neighbours)
-    if (n.world != s.me && sensible(n.load.expected) && n.load.expected < settings_.dead_band * load &&
-        std::none_of(refusals_.begin(), refusals_.end(), [&](const Refusal& r) { return r.world == n.world; }))
+  for (Neighbour n : s.neighbours) {
+    bool refused = false;
+    for (const Answer& a : answers_)
+      if (a.world == n.world) n.load.expected += a.cost, refused |= a.cost == 0;
+    if (n.world != s.me && sensible(n.load.expected) && n.load.expected < settings_.dead_band * load && !refused)
       ranked_.push_back(n);
+  }
   std::sort(ranked_.begin(), ranked_.end(), [](const Neighbour& a, const Neighbour& b) {
     return a.load.expected != b.load.expected ? a.load.expected < b.load.expected : a.world < b.world;
   });
@@ -58,8 +61,11 @@ std::optional<Proposal> Policy::propose(const Situation& s) {
   return std::nullopt;
 }
 
-void Policy::answered(Step now, WorldId taker, bool accepted) {
-  if (!accepted) refusals_.push_back({taker, now + settings_.refused});
+void Policy::answered(Step now, const Proposal& proposal, bool accepted) {
+  if (accepted)
+    answers_.push_back({proposal.taker, proposal.cost, now + settings_.unreported});
+  else
+    answers_.push_back({proposal.taker, 0, now + settings_.refused});
 }
 
 void Policy::took(Step now, WorldId giver, std::span<const std::uint32_t> cells) {

@@ -56,7 +56,7 @@ struct Settings {
   // A taker has at most this part of the giver's load: what differs less is noise, and moving it is not worth the work.
   double dead_band = 1 / 1.1;
   // Of the difference of two loads, what is given: half of it would make them equal, were they known exactly.
-  double share = 0.5;
+  double share = 0.45;
   double least_part = 0.02;   // of the giver's load: a transfer that carries less is not worth its messages
   double least_cost = 10e-6;  // s per step, likewise
   // Steps until a transfer has taken effect: the window, and what agreeing on it takes. A world that will be on time for
@@ -65,6 +65,7 @@ struct Settings {
   double patience = 2;
   Step keep = 240;             // steps for which a cell is not given back to whom it came from
   Step refused = 15;           // steps for which a world that refused is not asked again
+  Step unreported = 30;        // steps for which a world's reports may be older than what it has accepted
   std::size_t max_cells = 1024;  // of one transfer
   GrowthSettings growth;
 };
@@ -80,8 +81,9 @@ class Policy {
   // the lower cell.
   std::optional<Proposal> propose(const Situation& situation);
 
-  // The asked world's answer. One that refused is left alone for a while.
-  void answered(Step now, WorldId taker, bool accepted);
+  // The asked world's answer. One that refused is left alone for a while; one that accepted may not have said so in its
+  // reports yet.
+  void answered(Step now, const Proposal& proposal, bool accepted);
   // This world has accepted cells of another one: it does not give them back for a while.
   void took(Step now, WorldId giver, std::span<const std::uint32_t> cells);
 
@@ -91,8 +93,9 @@ class Policy {
     WorldId from;
     Step until;
   };
-  struct Refusal {
+  struct Answer {
     WorldId world;
+    double cost;  // s per step, accepted; 0: refused
     Step until;
   };
   bool must_give(const Situation& s) const;
@@ -100,7 +103,7 @@ class Policy {
 
   Settings settings_;
   std::vector<Kept> kept_;  // by cell
-  std::vector<Refusal> refusals_;
+  std::vector<Answer> answers_;
   std::vector<Neighbour> ranked_;
   Growth growth_;
 };

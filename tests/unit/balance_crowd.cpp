@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kDt = 1.0 / 60;
 constexpr Step kEvery = 15, kDelay = 15, kUntilEffect = 60, kLongAgo = 600;
+constexpr int kTries = 3;  // of a world that is refused, at once
 
 std::uint64_t mixed(std::uint64_t x) {  // splitmix64
   x += 0x9e3779b97f4a7c15ull;
@@ -120,9 +121,9 @@ void CrowdSession::apply() {
   }
 }
 
-void CrowdSession::decide(WorldId world) {
+bool CrowdSession::decide(WorldId world) {
   const bool busy = std::any_of(flying_.begin(), flying_.end(), [&](const Transfer& t) { return t.giver == world && now_ < t.agreed + o_.in_flight; });
-  if (!o_.balancing || busy || reports_.size() * kEvery <= kDelay) return;
+  if (!o_.balancing || busy || reports_.size() * kEvery <= kDelay) return true;
   const auto& known = reports_[reports_.size() - 1 - kDelay / kEvery];
   std::vector<std::uint32_t> mine;
   for (std::uint32_t c = 0; c < owner_.size(); ++c)
@@ -136,7 +137,7 @@ void CrowdSession::decide(WorldId world) {
   const Situation situation{o_.grid, world, now_, agreed_, mine, expected_cost_[world], reports_.back()[world], ahead_[world],
                             o_.budget, neighbours};
   const auto proposal = policies_[world].propose(situation);
-  if (!proposal) return;
+  if (!proposal) return true;
   // The taker counts what it has accepted since it reported.
   Load taker = reports_.back()[proposal->taker];
   for (const Transfer& t : flying_) {
@@ -146,10 +147,10 @@ void CrowdSession::decide(WorldId world) {
   }
   const bool accepted = may_take(o_.grid, agreed_, proposal->taker, proposal->cells, proposal->cost, taker,
                                  reports_.back()[world]);
-  policies_[world].answered(now_, proposal->taker, accepted);
+  policies_[world].answered(now_, *proposal, accepted);
   if (!accepted) {
     ++refused_;
-    return;
+    return false;
   }
   policies_[proposal->taker].took(now_, world, proposal->cells);
   for (const std::uint32_t cell : proposal->cells) {
@@ -163,6 +164,7 @@ void CrowdSession::decide(WorldId world) {
   last_transfer_ = now_;
   flying_.push_back({now_ + kUntilEffect, now_, world, proposal->taker, proposal->cells, proposal->cost});
   check("when agreed, step", agreed_);
+  return true;
 }
 
 double CrowdSession::slowest_over_mean() const {
@@ -198,7 +200,9 @@ void CrowdSession::run(Step steps) {
     }
     reports_.push_back(std::move(loads));
     if (reports_.size() > 4) reports_.pop_front();
-    for (WorldId w = 0; w < o_.worlds; ++w) decide(w);
+    for (WorldId w = 0; w < o_.worlds; ++w)
+      for (int tries = 0; tries < kTries && !decide(w); ++tries) {
+      }
   }
 }
 

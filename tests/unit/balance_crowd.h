@@ -78,7 +78,7 @@ class CrowdSession {
   void move();
   void forecast();
   void apply();
-  void decide(WorldId world);
+  bool decide(WorldId world);  // false: it was refused
   double measured(double cost);
   void check(const char* when, const std::vector<WorldId>& owner);
 
