@@ -122,12 +122,10 @@ std::vector<std::uint32_t> Growth::grow(const GrowthRequest& r, double& cost_giv
   direction_ = sweep_direction(r);
   for (const std::uint32_t cell : r.mine) consider(r, cell);
 
-  const auto done = [&] {
-    return given_ >= r.wanted || chosen_.size() >= r.max_cells || chosen_.size() + 1 >= r.mine.size();
-  };
-  for (int cuts = 0; !done();) {
+  for (int cuts = 0; chosen_.size() < r.max_cells && chosen_.size() + 1 < r.mine.size();) {
+    const bool enough = given_ >= r.wanted;  // from then on only what makes the border shorter
     if (heap_.empty()) {
-      if (blocked_.empty() || cuts++ == kCuts) break;
+      if (enough || blocked_.empty() || cuts++ == kCuts) break;
       const auto best = std::max_element(blocked_.begin(), blocked_.end());
       const std::uint32_t cell = best->cell;
       blocked_.erase(best);
@@ -137,7 +135,7 @@ std::vector<std::uint32_t> Growth::grow(const GrowthRequest& r, double& cost_giv
       const Candidate best = heap_.back();
       heap_.pop_back();
       if (state_[best.cell] != kFree || best.score != score(r, best.cell)) continue;  // there is a newer one of this cell
-      if (given_ + r.cost[best.cell] > r.limit) continue;
+      if (given_ + r.cost[best.cell] > r.limit || (enough && border_growth(r, best.cell) >= 0)) continue;
       if (!can_leave(r.grid, best.cell, [&](std::size_t n) { return is_left(r, n); })) {
         blocked_.push_back(best);
         continue;
@@ -148,7 +146,7 @@ std::vector<std::uint32_t> Growth::grow(const GrowthRequest& r, double& cost_giv
   }
   for (const std::uint32_t cell : r.mine) state_[cell] = 0;
 
-  // A little less, where that leaves a shorter border.
+  // A little less, where that leaves a shorter border still.
   cost_given = 0;
   if (reached_.empty()) return {};
   Reached best = reached_.back();
