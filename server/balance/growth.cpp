@@ -73,8 +73,8 @@ void Growth::choose(const GrowthRequest& r, std::uint32_t cell) {
   for_around(r.grid, cell, [&](std::size_t n) { consider(r, n); });
 }
 
-// Chooses a cell that may cut what is left into pieces, and all of these but the most costly one. Rings and strips one cell
-// wide could give nothing otherwise.
+// Chooses a cell that may cut what is left into pieces, and all of these but the most costly one. Rings and strips one
+// cell wide could give nothing otherwise.
 bool Growth::choose_with_rest(const GrowthRequest& r, std::uint32_t cell) {
   rest_.clear();                       // flooded, all pieces one after the other
   std::size_t kept = 0, kept_end = 0;  // the piece that is kept, in rest_
@@ -134,7 +134,8 @@ std::vector<std::uint32_t> Growth::grow(const GrowthRequest& r, double& cost_giv
       std::pop_heap(heap_.begin(), heap_.end());
       const Candidate best = heap_.back();
       heap_.pop_back();
-      if (state_[best.cell] != kFree || best.score != score(r, best.cell)) continue;  // there is a newer one of this cell
+      if (state_[best.cell] != kFree || best.score != score(r, best.cell))
+        continue;  // there is a newer one of this cell
       if (given_ + r.cost[best.cell] > r.limit || (enough && border_growth(r, best.cell) >= 0)) continue;
       if (!can_leave(r.grid, best.cell, [&](std::size_t n) { return is_left(r, n); })) {
         blocked_.push_back(best);

@@ -21,12 +21,12 @@ struct GrowthSettings {
 struct GrowthRequest {
   const Grid& grid;
   WorldId giver = 0, taker = 0;
-  std::span<const WorldId> owner;       // by cell
-  std::span<const std::uint32_t> mine;  // ascending, the giver's cells that may be given
-  std::span<const double> cost;         // by cell, s per step
+  std::span<const WorldId> owner;             // by cell
+  std::span<const std::uint32_t> mine;        // ascending, the giver's cells that may be given
+  std::span<const double> cost;               // by cell, s per step
   std::function<bool(std::uint32_t)> barred;  // cells not to give to this taker
-  double wanted = 0;                    // s per step, to give if possible
-  double limit = 0;                     // s per step, at most
+  double wanted = 0;                          // s per step, to give if possible
+  double limit = 0;                           // s per step, at most
   std::size_t max_cells = 0;
 };
 

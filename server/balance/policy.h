@@ -1,6 +1,6 @@
-// Load balancing without a centre: which cells a world gives to which neighbour, decided by the world alone from what it
-// knows of itself and what its neighbours said of themselves. Paper, section 3.4.2; docs/balancing.md says how and why.
-// Pure: knows no clock, network or bodies. What it decides can change no bit of the simulation, only its speed.
+// Load balancing without a centre: which cells a world gives to which neighbour, decided by the world alone from what
+// it knows of itself and what its neighbours said of themselves. Paper, section 3.4.2; docs/balancing.md says how and
+// why. Pure: knows no clock, network or bodies. What it decides can change no bit of the simulation, only its speed.
 #pragma once
 
 #include <cstdint>
@@ -36,14 +36,14 @@ struct Neighbour {
 struct Situation {
   const Grid& grid;
   WorldId me = 0;
-  Step now = 0;                            // the world's clock; never falls by more than a window
-  std::span<const WorldId> owner;          // by cell, after all transfers that are known
-  std::span<const std::uint32_t> mine;     // cells, ascending, that are mine now and after all known transfers
-  std::span<const double> cost;            // by cell: s per step that each of mine will cost (as Load::expected)
-  Load load;                               // mine
-  double ahead = 0;                        // steps computed beyond the displayed one
-  double budget = 0;                       // s per step at the displayed rate; 0: as fast as possible
-  std::span<const Neighbour> neighbours;   // those who have reported, in any order
+  Step now = 0;                           // the world's clock; never falls by more than a window
+  std::span<const WorldId> owner;         // by cell, after all transfers that are known
+  std::span<const std::uint32_t> mine;    // cells, ascending, that are mine now and after all known transfers
+  std::span<const double> cost;           // by cell: s per step that each of mine will cost (as Load::expected)
+  Load load;                              // mine
+  double ahead = 0;                       // steps computed beyond the displayed one
+  double budget = 0;                      // s per step at the displayed rate; 0: as fast as possible
+  std::span<const Neighbour> neighbours;  // those who have reported, in any order
 };
 
 struct Proposal {
@@ -59,13 +59,13 @@ struct Settings {
   double share = 0.45;
   double least_part = 0.02;   // of the giver's load: a transfer that carries less is not worth its messages
   double least_cost = 10e-6;  // s per step, likewise
-  // Steps until a transfer has taken effect: the window, and what agreeing on it takes. A world that will be on time for
-  // `patience` times as long gives nothing.
+  // Steps until a transfer has taken effect: the window, and what agreeing on it takes. A world that will be on time
+  // for `patience` times as long gives nothing.
   double transfer_steps = 48 + 8;
   double patience = 2;
-  Step keep = 240;             // steps for which a cell is not given back to whom it came from
-  Step refused = 15;           // steps for which a world that refused is not asked again
-  Step unreported = 30;        // steps for which a world's reports may be older than what it has accepted
+  Step keep = 240;               // steps for which a cell is not given back to whom it came from
+  Step refused = 15;             // steps for which a world that refused is not asked again
+  Step unreported = 30;          // steps for which a world's reports may be older than what it has accepted
   std::size_t max_cells = 1024;  // of one transfer
   GrowthSettings growth;
 };
@@ -108,10 +108,10 @@ class Policy {
   Growth growth_;
 };
 
-// What an asked world checks before it accepts: that the cells (ascending, of `cost` s per step together) leave it with no
-// more pieces than it has, and that it then has no more to do than the giver has left, to a tolerance for what has
-// changed since the giver's proposal. `owner`: after all transfers that it knows, without this one. `mine.expected` counts
-// what it has accepted already.
+// What an asked world checks before it accepts: that the cells (ascending, of `cost` s per step together) leave it with
+// no more pieces than it has, and that it then has no more to do than the giver has left, to a tolerance for what has
+// changed since the giver's proposal. `owner`: after all transfers that it knows, without this one. `mine.expected`
+// counts what it has accepted already.
 bool may_take(const Grid& grid, std::span<const WorldId> owner, WorldId me, std::span<const std::uint32_t> cells,
               double cost, const Load& mine, const Load& giver);
 

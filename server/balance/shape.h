@@ -42,8 +42,9 @@ void for_around(const Grid& grid, std::size_t index, F&& f) {
 // Whether the cells of `world` are one piece, by faces. A world without cells counts as connected. O(grid).
 bool connected(const Grid& grid, std::span<const WorldId> owner, WorldId world);
 
-// Whether `world`, given these cells, would have no more pieces than before: each piece of them shares a face with a cell
-// that is the world's already. `cells`: ascending, none of them the world's. A world without cells is given nothing so.
+// Whether `world`, given these cells, would have no more pieces than before: each piece of them shares a face with a
+// cell that is the world's already. `cells`: ascending, none of them the world's. A world without cells is given
+// nothing so.
 bool attached(const Grid& grid, std::span<const WorldId> owner, WorldId world, std::span<const std::uint32_t> cells);
 
 namespace detail {
@@ -61,9 +62,9 @@ constexpr std::array<std::uint32_t, 27> kFaces = [] {
 constexpr std::uint32_t kCentre = 13;
 }  // namespace detail
 
-// Whether those of `cell`'s neighbours by faces that are `in` a set of cells hang together without it, by cells within one
-// cell of it. Then the set has no more pieces without the cell than with it. (Where they hang together by a longer way
-// only, the answer is no, too.)
+// Whether those of `cell`'s neighbours by faces that are `in` a set of cells hang together without it, by cells within
+// one cell of it. Then the set has no more pieces without the cell than with it. (Where they hang together by a longer
+// way only, the answer is no, too.)
 template <typename In>
 bool can_leave(const Grid& grid, std::size_t cell, In&& in) {
   const Cell c = cell_at(grid, cell);

@@ -1,4 +1,4 @@
-#include "tests/unit/balance_crowd.h"
+#include "balance_crowd.h"
 
 #include <algorithm>
 #include <cmath>
@@ -81,17 +81,16 @@ void CrowdSession::move() {
   for (std::size_t c = 0; c < count_.size(); ++c) load_[owner_[c]] += o_.cost * static_cast<double>(count_[c]);
 }
 
-// What each world expects of each cell: of the bodies that it knows, its own and those within half a cell of it, that they
-// go on as they do.
+// What each world expects of each cell: of the bodies that it knows, its own and those within half a cell of it, that
+// they go on as they do.
 void CrowdSession::forecast() {
   for (auto& cost : expected_cost_) std::fill(cost.begin(), cost.end(), 0);
   constexpr double kMoment = 0.05;
   for (std::size_t b = 0; b < o_.bodies; ++b) {
     const double time = static_cast<double>(now_) * kDt;
     const Vec3 at = o_.walk(b, time);
-    const Vec3 then = o_.foresight && time > kMoment
-                          ? Vec3(at + (at - o_.walk(b, time - kMoment)) * (o_.horizon / kMoment))
-                          : at;
+    const Vec3 then =
+        o_.foresight && time > kMoment ? Vec3(at + (at - o_.walk(b, time - kMoment)) * (o_.horizon / kMoment)) : at;
     const std::size_t goal = o_.grid.index(o_.grid.cell_of(then));
     const WorldId w = agreed_[goal];
     bool known = false;
@@ -122,7 +121,8 @@ void CrowdSession::apply() {
 }
 
 bool CrowdSession::decide(WorldId world) {
-  const bool busy = std::any_of(flying_.begin(), flying_.end(), [&](const Transfer& t) { return t.giver == world && now_ < t.agreed + o_.in_flight; });
+  const bool busy = std::any_of(flying_.begin(), flying_.end(),
+                                [&](const Transfer& t) { return t.giver == world && now_ < t.agreed + o_.in_flight; });
   if (!o_.balancing || busy || reports_.size() * kEvery <= kDelay) return true;
   const auto& known = reports_[reports_.size() - 1 - kDelay / kEvery];
   std::vector<std::uint32_t> mine;
@@ -134,8 +134,9 @@ bool CrowdSession::decide(WorldId world) {
     if (agreed_[c] == world) for_around(o_.grid, c, [&](std::size_t n) { near[agreed_[n]] = 1; });
   for (WorldId n = 0; n < o_.worlds; ++n)
     if (near[n] && n != world) neighbours.push_back({n, known[n]});
-  const Situation situation{o_.grid, world, now_, agreed_, mine, expected_cost_[world], reports_.back()[world], ahead_[world],
-                            o_.budget, neighbours};
+  const Situation situation{
+      o_.grid,       world,     now_,      agreed_, mine, expected_cost_[world], reports_.back()[world],
+      ahead_[world], o_.budget, neighbours};
   const auto proposal = policies_[world].propose(situation);
   if (!proposal) return true;
   // The taker counts what it has accepted since it reported.
@@ -145,8 +146,8 @@ bool CrowdSession::decide(WorldId world) {
     if (t.taker == proposal->taker) taker.expected += t.cost;
     if (t.giver == proposal->taker) taker.expected -= t.cost;
   }
-  const bool accepted = may_take(o_.grid, agreed_, proposal->taker, proposal->cells, proposal->cost, taker,
-                                 reports_.back()[world]);
+  const bool accepted =
+      may_take(o_.grid, agreed_, proposal->taker, proposal->cells, proposal->cost, taker, reports_.back()[world]);
   policies_[world].answered(now_, *proposal, accepted);
   if (!accepted) {
     ++refused_;

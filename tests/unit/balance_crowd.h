@@ -25,15 +25,15 @@ struct CrowdOptions {
   WorldId worlds = 4;
   std::size_t bodies = 0;
   Walk walk;
-  double cost = 10e-6;      // s per step, of a body
-  double noise = 0;         // of measured costs, relative
-  double budget = 0;        // s per step
-  double window = 48;       // steps that a world may be ahead of what is displayed
+  double cost = 10e-6;  // s per step, of a body
+  double noise = 0;     // of measured costs, relative
+  double budget = 0;    // s per step
+  double window = 48;   // steps that a world may be ahead of what is displayed
   bool balancing = true;
-  bool foresight = true;    // costs are where bodies are heading, else where they are
-  double horizon = 1;       // s, of foresight
-  Step in_flight = 60;      // steps after an agreement until the giver may make the next
-  double speed_known = 0.5; // cells about a world from which it knows of bodies
+  bool foresight = true;     // costs are where bodies are heading, else where they are
+  double horizon = 1;        // s, of foresight
+  Step in_flight = 60;       // steps after an agreement until the giver may make the next
+  double speed_known = 0.5;  // cells about a world from which it knows of bodies
   Settings settings;
 };
 
@@ -46,7 +46,7 @@ class CrowdSession {
   void run(Step steps);
 
   Step now() const { return now_; }
-  double slowest_over_mean() const;  // of the worlds' present loads
+  double slowest_over_mean() const;        // of the worlds' present loads
   double worst() const { return worst_; }  // the largest of that since the last call of forget()
   double mean_ratio() const { return ratios_ / static_cast<double>(samples_); }
   void forget() { worst_ = ratios_ = 0, samples_ = 0; }
@@ -84,10 +84,10 @@ class CrowdSession {
 
   CrowdOptions o_;
   Step now_ = 0;
-  std::vector<WorldId> owner_, agreed_;  // now, and after all transfers
-  std::vector<std::uint32_t> cell_;      // by body
-  std::vector<std::size_t> count_;       // bodies by cell
-  std::vector<double> load_;             // by world, true, s per step
+  std::vector<WorldId> owner_, agreed_;             // now, and after all transfers
+  std::vector<std::uint32_t> cell_;                 // by body
+  std::vector<std::size_t> count_;                  // bodies by cell
+  std::vector<double> load_;                        // by world, true, s per step
   std::vector<std::vector<double>> expected_cost_;  // by world, by cell
   std::deque<Transfer> flying_;
   std::vector<Policy> policies_;
@@ -101,9 +101,9 @@ class CrowdSession {
   std::uint64_t random_ = 1;
 };
 
-// `bodies` in a crowd that walks from one corner of the grid to the other in `seconds` and stays there: a Gaussian blob of
-// `spread` cells, cut off at `radius` cells from its middle along x and y, with which it starts at the grid's edges and
-// stops there; upright half a Gaussian of one cell, on the ground. And one body that stands in each cell.
+// `bodies` in a crowd that walks from one corner of the grid to the other in `seconds` and stays there: a Gaussian blob
+// of `spread` cells, cut off at `radius` cells from its middle along x and y, with which it starts at the grid's edges
+// and stops there; upright half a Gaussian of one cell, on the ground. And one body that stands in each cell.
 Walk walking_crowd(const Grid& grid, std::size_t bodies, double spread, double radius, double seconds);
 
 // Territories as a session starts with: bisection by where the bodies are at time 0.

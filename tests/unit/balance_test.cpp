@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kMs = 1e-3;  // s
 
-// One layer of cells: in `map` a digit is a cell's owner, rows from y = 0 up. World 0 asks itself; loads are in ms per step.
+// One layer of cells: in `map` a digit is a cell's owner, rows from y = 0 up. World 0 asks itself; loads are in ms per
+// step.
 struct Field {
   Grid grid;
   std::vector<WorldId> owner;
@@ -72,7 +73,7 @@ TEST(BalanceShape, WhatIsGivenMustTouchWhatTheTakerHas) {
   Field f({"0000", "0000", "0011", "0011"});
   const auto attached_to_1 = [&](std::vector<std::uint32_t> cells) { return attached(f.grid, f.owner, 1, cells); };
   EXPECT_TRUE(attached_to_1({6, 7}));
-  EXPECT_TRUE(attached_to_1({2, 6}));      // one by way of the other
+  EXPECT_TRUE(attached_to_1({2, 6}));  // one by way of the other
   EXPECT_FALSE(attached_to_1({2}));
   EXPECT_FALSE(attached_to_1({5}));        // by a corner
   EXPECT_FALSE(attached_to_1({0, 1, 6}));  // in part
