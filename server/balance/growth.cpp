@@ -108,7 +108,7 @@ bool Growth::choose_with_rest(const GrowthRequest& r, std::uint32_t cell) {
   return true;
 }
 
-std::vector<std::uint32_t> Growth::grow(const GrowthRequest& r, double& cost_given) {
+Growth::Grown Growth::grow(const GrowthRequest& r) {
   state_.resize(r.grid.cells(), 0);
   heap_.clear(), blocked_.clear(), chosen_.clear(), reached_.clear();
   given_ = border_ = 0;
@@ -147,17 +147,15 @@ std::vector<std::uint32_t> Growth::grow(const GrowthRequest& r, double& cost_giv
   }
   for (const std::uint32_t cell : r.mine) state_[cell] = 0;
 
-  // A little less, where that leaves a shorter border still.
-  cost_given = 0;
   if (reached_.empty()) return {};
   Reached best = reached_.back();
+  const bool full = best.cost < r.wanted && best.cells >= r.max_cells;
+  // A little less, where that leaves a shorter border still.
   for (const Reached& k : reached_)
-    if (k.cost >= (1 - settings_.slack) * given_ && k.border < best.border) best = k;
+    if (!full && k.cost >= (1 - settings_.slack) * given_ && k.border < best.border) best = k;
   chosen_.resize(best.cells);
-  cost_given = best.cost;
-  std::vector<std::uint32_t> cells = chosen_;
-  std::sort(cells.begin(), cells.end());
-  return cells;
+  std::sort(chosen_.begin(), chosen_.end());
+  return {chosen_, best.cost, full};
 }
 
 }  // namespace soda::balance

@@ -34,8 +34,12 @@ class Growth {
  public:
   explicit Growth(const GrowthSettings& settings = {}) : settings_(settings) {}
 
-  // The cells, ascending; empty where nothing can be given. `cost_given`: s per step, of all of them.
-  std::vector<std::uint32_t> grow(const GrowthRequest& request, double& cost_given);
+  struct Grown {
+    std::vector<std::uint32_t> cells;  // ascending; empty where nothing can be given
+    double cost = 0;                   // s per step, of all of them
+    bool full = false;                 // there would be more to give, if more cells were allowed
+  };
+  Grown grow(const GrowthRequest& request);
 
  private:
   struct Candidate {

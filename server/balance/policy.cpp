@@ -53,10 +53,16 @@ std::optional<Proposal> Policy::propose(const Situation& s) {
     request.wanted = settings_.share * difference;
     request.limit = 0.5 * difference;
     request.max_cells = settings_.max_cells;
-    Proposal proposal{n.world, {}, 0};
-    proposal.cells = growth_.grow(request, proposal.cost);
-    if (proposal.cells.empty()) continue;
-    if (proposal.cost >= std::max(settings_.least_cost, settings_.least_part * load)) return proposal;
+    // Cells that cost more cannot go; if little is left without them, there is no sense in giving what costs nothing.
+    double movable = 0;
+    for (const std::uint32_t cell : s.mine)
+      if (s.cost[cell] <= request.limit) movable += s.cost[cell];
+    const double least = std::max(settings_.least_cost, settings_.least_part * load);
+    if (movable < least) continue;
+    Growth::Grown grown = growth_.grow(request);
+    // As many cells as there may be are a step towards those that cost something.
+    if (grown.cells.empty() || (grown.cost < least && !grown.full)) continue;
+    return Proposal{n.world, std::move(grown.cells), grown.cost};
   }
   return std::nullopt;
 }

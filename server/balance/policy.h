@@ -66,7 +66,7 @@ struct Settings {
   Step keep = 240;               // steps for which a cell is not given back to whom it came from
   Step refused = 15;             // steps for which a world that refused is not asked again
   Step unreported = 30;          // steps for which a world's reports may be older than what it has accepted
-  std::size_t max_cells = 1024;  // of one transfer
+  std::size_t max_cells = 4096;  // of one transfer
   GrowthSettings growth;
 };
 

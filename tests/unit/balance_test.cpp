@@ -215,6 +215,23 @@ TEST(Balance, AtMostSoManyCellsAtOnce) {
   EXPECT_GT(f.ask()->cells.size(), 7u);
 }
 
+TEST(Balance, ManySmallStepsReachAFarCrowd) {
+  Field f(std::vector<std::string>(12, "000000000000000000000011"));
+  for (const std::size_t c : {98, 99, 122, 123, 146, 147, 170, 171}) f.cost[c] = 2 * kMs;
+  f.knows(1, 0);
+  Settings settings;
+  settings.max_cells = 20;
+  Policy policy(settings);
+  int steps = 0;
+  while (const auto p = f.ask(policy)) {
+    ASSERT_LT(++steps, 20);
+    f.apply(*p);
+    f.neighbours[0].load.expected += p->cost;
+    ASSERT_TRUE(connected(f.grid, f.owner, 0) && connected(f.grid, f.owner, 1)) << f.text();
+  }
+  EXPECT_GE(f.neighbours[0].load.expected, 6 * kMs) << f.text();
+}
+
 TEST(Balance, WhoRefusedIsNotAskedAgainSoon) {
   Field f({"2000", "2000", "1000", "1000"}, 1);
   f.knows(1, 1).knows(2, 2);
