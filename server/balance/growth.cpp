@@ -53,7 +53,7 @@ double Growth::border_growth(const GrowthRequest& r, std::size_t cell) const {
 
 double Growth::score(const GrowthRequest& r, std::size_t cell) const {
   const double depth = direction_.towards.dot(place(r.grid, cell) - direction_.from);
-  return border_growth(r, cell) + settings_.sweep * std::max(depth, 0.0);
+  return border_growth(r, cell) + settings_.sweep * depth;
 }
 
 void Growth::consider(const GrowthRequest& r, std::size_t cell) {

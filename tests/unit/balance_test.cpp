@@ -19,6 +19,7 @@ struct Field {
   std::vector<double> cost;
   std::vector<Neighbour> neighbours;
   double budget = 0, ahead = 48;
+  double coming = 0;  // ms per step, of cells accepted that are another's still
   Load load;
   Step now = 0;
 
@@ -40,7 +41,7 @@ struct Field {
   }
   std::optional<Proposal> ask(Policy& policy) {
     const auto cells = mine();
-    load.work = load.expected = std::accumulate(cost.begin(), cost.end(), 0.0);
+    load.work = load.expected = std::accumulate(cost.begin(), cost.end(), coming * kMs);
     return policy.propose({grid, 0, now, owner, cells, cost, load, ahead, budget, neighbours});
   }
   std::optional<Proposal> ask() {
@@ -109,10 +110,10 @@ TEST(Balance, GivesHalfTheDifferenceAtMostBehindAStraightBorder) {
 }
 
 TEST(Balance, WhatDiffersLittleStays) {
-  Field f({"00001111", "00001111"}, 1);
-  EXPECT_FALSE(Field(f).knows(1, 7.5).ask());
-  EXPECT_FALSE(Field(f).knows(1, 9).ask());
-  EXPECT_TRUE(Field(f).knows(1, 5).ask());
+  Field f(std::vector<std::string>(10, "0000000000111111"), 0.1);  // 10 ms in small cells
+  EXPECT_FALSE(Field(f).knows(1, 12).ask());
+  EXPECT_FALSE(Field(f).knows(1, 9.2).ask());
+  EXPECT_TRUE(Field(f).knows(1, 9).ask());
 }
 
 TEST(Balance, TheLeastLoadedNeighbourThatTouchesIsGiven) {
@@ -122,7 +123,8 @@ TEST(Balance, TheLeastLoadedNeighbourThatTouchesIsGiven) {
   EXPECT_EQ(Field(map, 1).knows(2, 3).knows(1, 3).ask()->taker, 1u);             // the lower one
   EXPECT_EQ(Field(map, 1).knows(4, 0).knows(1, 3).ask()->taker, 1u);             // 4 touches by a corner only
   EXPECT_EQ(Field(map, 1).knows(1, std::nan("")).knows(2, 3).ask()->taker, 2u);  // says nothing sensible
-  EXPECT_FALSE(Field(map, 1).ask());                                             // nobody has reported yet
+  EXPECT_EQ(Field(map, 1).knows(1, -1).knows(2, 3).ask()->taker, 2u);
+  EXPECT_FALSE(Field(map, 1).ask());  // nobody has reported yet
 }
 
 TEST(Balance, BelongsToTheFutureNotThePresent) {
@@ -155,6 +157,10 @@ TEST(Balance, OneHeavyCellIsLeftAlone) {
   f.knows(1, 1);
   f.cost[1] = 20 * kMs;  // cannot be split, and would only change places
   EXPECT_FALSE(f.ask());
+  Settings settings;
+  settings.max_cells = 2;  // nor are empty cells given to get at it
+  Policy policy(settings);
+  EXPECT_FALSE(f.ask(policy));
   for (const std::size_t c : {0, 2, 3, 8, 9, 10, 11}) f.cost[c] = 1 * kMs;
   const auto p = f.ask();  // but not the rest beside it
   ASSERT_TRUE(p);
@@ -170,6 +176,9 @@ TEST(Balance, NeverGivesAll) {
   f.cost = {0, 5 * kMs, 0};
   EXPECT_FALSE(f.knows(1, 0).ask());
   f.cost = {5 * kMs, 0.5 * kMs, 0};
+  EXPECT_EQ(f.ask()->cells, std::vector<std::uint32_t>{1});
+  f.cost = {1 * kMs, 1 * kMs, 0};
+  f.coming = 20;
   EXPECT_EQ(f.ask()->cells, std::vector<std::uint32_t>{1});
 }
 
