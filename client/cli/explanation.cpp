@@ -6,25 +6,17 @@
 #include <cstdio>
 #include <string>
 
+#include "client/cli/status_sum.h"
+
 namespace soda::cli {
 
 void print_explanation(const Collector& collector, std::uint32_t substeps) {
   if (!collector.session()) return;
   const double steps = static_cast<double>(std::max<Step>(1, collector.whole_steps() - 1));
-  wire::Status sum;
-  double seconds = 0, work = 0;
-  for (const wire::Status& s : collector.worlds()) {
-    for (std::size_t k = 0; k < s.shares().size(); ++k) {
-      sum.shares()[k].islands() += s.shares()[k].islands();
-      sum.shares()[k].bodies() += s.shares()[k].bodies();
-      sum.shares()[k].contacts() += s.shares()[k].contacts();
-      sum.shares()[k].seconds() += s.shares()[k].seconds();
-      seconds += s.shares()[k].seconds();
-    }
-    work += s.work_seconds();
-    sum.joints_together() += s.joints_together(), sum.joints_alone() += s.joints_alone();
-    sum.turning_flights() += s.turning_flights(), sum.bouncing() += s.bouncing();
-  }
+  const wire::Status sum = sum_of(collector.worlds());
+  const double work = sum.work_seconds();
+  double seconds = 0;
+  for (const wire::ModelShare& share : sum.shares()) seconds += share.seconds();
   std::string text =
       "\nHow the scene was modelled, per step (what was done again counts again; sleeping bodies do not):\n";
   text +=

@@ -99,7 +99,7 @@ std::vector<std::string> arguments(const LaunchOptions& o, double dt, WorldId wo
   if (world != 0) return args;
   add({"--scene-fd", std::to_string(kSceneFd), "--worlds", std::to_string(o.worlds), "--steps", std::to_string(o.steps),
        "--pace", o.pace, "--sync", o.sync, "--anticipation", std::to_string(o.window), "--input-lead",
-       std::to_string(o.lead)});
+       std::to_string(o.lead), "--balance", o.balance});
   add({"--actions-fd", std::to_string(kActionsFd)});
   if (!o.follow.files.record.empty()) {
     const double every = o.poses > 0 ? std::max(1.0, std::round(1 / (o.poses * dt))) : 0;

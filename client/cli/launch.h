@@ -22,6 +22,7 @@ struct LaunchOptions {
   std::string sync = "anticipative";
   Step window = kDefaultWindow;
   Step lead = kDefaultLead;
+  std::string balance = "on";
   std::string dump_steps;
   std::string start;  // worlds to start here; "": all
   double poses = 30;  // recorded per second of simulated time; 0: none

@@ -115,6 +115,10 @@ void add_run_command(CLI::App& app, int& exit_code) {
                    "file of regions that worlds own at the start, by hand (docs/scenes.md); chosen if not given")
       ->check(CLI::ExistingFile);
   command
+      ->add_option("--balance", o->balance, "'on': worlds that have much to do give cells to their neighbours; 'off'")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str();
+  command
       ->add_option("--input-lead", o->lead,
                    "steps after the displayed one that are closed for actions: an action of now comes after them")
       ->check(CLI::Range(Step{1}, kLargestLead))

@@ -3,10 +3,12 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <string>
 #include <string_view>
 
+#include "client/cli/status_sum.h"
 #include "client/cli/table.h"
 #include "common/run_settings.h"
 #include "common/scene_hash.h"
@@ -81,27 +83,8 @@ void add_counters(Object& object, const wire::Status& s) {
   object.add("paced_seconds", s.paced_seconds());
   object.add("cpu_seconds", s.cpu_seconds());
   object.add("peak_memory_bytes", s.peak_memory());
-}
-
-wire::Status sum_of(const std::vector<wire::Status>& worlds) {
-  wire::Status sum;
-  for (const wire::Status& s : worlds) {
-    sum.bodies() += s.bodies(), sum.cells() += s.cells(), sum.steps() += s.steps(), sum.syncs() += s.syncs();
-    sum.mixed_islands() += s.mixed_islands(), sum.arrived() += s.arrived(), sum.departed() += s.departed();
-    sum.wide_bodies() += s.wide_bodies(), sum.messages_sent() += s.messages_sent(), sum.bytes_sent() += s.bytes_sent();
-    sum.frames_sent() += s.frames_sent(), sum.frame_bodies_sent() += s.frame_bodies_sent();
-    sum.parts_sent() += s.parts_sent(), sum.messages_resent() += s.messages_resent();
-    sum.duplicates() += s.duplicates(), sum.refused() += s.refused(), sum.clamped() += s.clamped();
-    sum.non_finite() += s.non_finite(), sum.interruptions() += s.interruptions();
-    sum.logged() = std::max(sum.logged(), s.logged()), sum.held_back() += s.held_back();
-    sum.anticipated() += s.anticipated(), sum.bodies_computed() += s.bodies_computed();
-    sum.bodies_redone() += s.bodies_redone(), sum.rollbacks() += s.rollbacks();
-    sum.longest_rollback() = std::max(sum.longest_rollback(), s.longest_rollback());
-    sum.work_seconds() += s.work_seconds(), sum.waiting_seconds() += s.waiting_seconds();
-    sum.paced_seconds() += s.paced_seconds(), sum.cpu_seconds() += s.cpu_seconds();
-    sum.peak_memory() += s.peak_memory();
-  }
-  return sum;
+  object.add("transfers", s.transfers());
+  object.add("cells_given", s.cells_given());
 }
 
 std::string world_json(const wire::Status& s) {
@@ -114,6 +97,8 @@ std::string world_json(const wire::Status& s) {
   object.add("final_step", s.final_step());
   object.add("front", s.front());
   object.add("neighbours", s.neighbours());
+  object.add("step_seconds", s.step_seconds());
+  if (std::isfinite(s.steps_on_time())) object.add("steps_on_time", s.steps_on_time());  // else for ever
   add_counters(object, s);
   return object.str();
 }

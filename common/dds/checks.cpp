@@ -182,6 +182,7 @@ std::string problem(const wire::Status& s) {
     if (!ok_seconds(seconds)) return "impossible time";
   for (const wire::ModelShare& share : s.shares())
     if (!ok_seconds(share.seconds())) return "impossible time";
+  if (!ok_seconds(s.step_seconds()) || !(s.steps_on_time() >= 0)) return "impossible load";
   return "";
 }
 

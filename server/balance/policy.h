@@ -4,28 +4,17 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "common/grid.h"
 #include "common/ids.h"
+#include "common/load.h"
 #include "server/balance/growth.h"
 #include "server/balance/shape.h"
 
 namespace soda::balance {
-
-// What a world says of itself to its neighbours.
-struct Load {
-  double work = 0;  // s of CPU time per step, recent mean
-  // The same about a second from now, when a transfer agreed on now will have taken effect: with all known transfers
-  // and accepted ones done, and bodies where they are heading. Decisions are made on this; `work` where nothing better
-  // is known.
-  double expected = 0;
-  // Steps that it can still serve in time at the displayed rate under its present load (common/anticipation.h).
-  double on_time = std::numeric_limits<double>::infinity();
-};
 
 struct Neighbour {
   WorldId world = 0;

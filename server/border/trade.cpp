@@ -36,7 +36,7 @@ void Trade::answered(const Link& from, const Answer& answer) {
 std::optional<Transfer> Trade::agreed() {
   if (!offered_ || !offered_->accepted) return std::nullopt;
   const WorldId me = context_.settings.me;
-  given_at_ = context_.final_step + context_.settings.window + kHops + 2;
+  given_at_ = context_.final_step + steps_to_transfer(context_.settings.window);
   Transfer transfer{me, territories_.known(me) + 1, given_at_, offered_->taker, std::move(offered_->cells)};
   offered_.reset();
   return transfer;

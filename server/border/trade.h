@@ -6,7 +6,7 @@
 // only when it has heard that its neighbours' states t are, and in a stream the transfer comes before whatever becomes
 // final after it. So a world h neighbours away knows it before its own final step is beyond F + h, with F the giver's
 // when it was told, and before its clock, which is at most K beyond that, is beyond F + h + K. With
-//   T = F + K + kHops + 2
+//   T = F + K + kHops + 2  (steps_to_transfer)
 // whoever is within kHops has not computed state T yet. Those are all to whom it matters: a world asks only whom cells
 // within five of its own, or its neighbours', belong to (three hops at most, since worlds within two cells are
 // neighbours), and who has just taken such cells had them from a neighbour (one more). The longest chain of takers
@@ -29,8 +29,6 @@
 #include "server/border/territories.h"
 
 namespace soda::border {
-
-constexpr Step kHops = 6;
 
 class Trade {
  public:

@@ -474,8 +474,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     timeline_.release_before(keep);
     announcer_.release_before(keep);
     settler_.release_before(keep);
-    const Step ahead = settings_.window + kHops + 2;
-    territories_.release_before(keep, 8 * ahead);
+    territories_.release_before(keep, 8 * steps_to_transfer(settings_.window));
   }
 
   void count(Step step) {

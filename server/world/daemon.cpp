@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <ctime>
 #include <utility>
 
 #include "common/actions/action_proto.h"
@@ -30,6 +31,13 @@ constexpr auto kFinishAtMost = 10s;
 
 double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
 double seconds(const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); }
+
+// Of the calling thread.
+double thread_cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
 
 std::string host_name() {
   char name[256] = {};
@@ -57,10 +65,22 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core.window = settings.window;
   core.measure = settings.measure;
   core.actions = true;
+  core.balance = settings.balance;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
+  if (settings.balance && settings.worlds > 1) balancer_.emplace(*core_, map_.grid, settings.me, settings.window);
   lines_.resize(settings.worlds);
-  transport_.open(core_->neighbours());
+  open_lines();
+}
+
+// With worlds that have become neighbours.
+void Daemon::open_lines() {
+  const std::vector<WorldId>& all = core_->neighbours();
+  if (opened_ == all.size()) return;
+  const std::span<const WorldId> fresh = std::span(all).subspan(opened_);
+  opened_ = all.size();
+  for (const WorldId world : fresh) lines_.at(world) = {Clock::now(), kPatience};
+  transport_.open(fresh);
 }
 
 void Daemon::set_limit(Step newest) {
@@ -115,6 +135,21 @@ void Daemon::act_all() {
   }
   for (const LoggedAction& action : next) core_->act(action);
   core_->close_actions(closed, logged);
+}
+
+void Daemon::set_pace(double pace) { pace_.store(pace); }
+
+soda::balance::Pace Daemon::pace() const {
+  const double pace = pace_.load();
+  if (!(pace > 0) || limit_known_ == kNoLimit) return {};
+  return {model_.scene().dt / pace, limit_known_ - settings_.window};
+}
+
+void Daemon::balance() {
+  balancer_->consider(pace());
+  for (const border::Transfer& t : core_->take_transfers())
+    if (t.giver == settings_.me)
+      spdlog::info("gives {} cells to world {} from step {} on", t.cells.size(), t.taker, t.step);
 }
 
 void Daemon::release() {
@@ -236,6 +271,12 @@ wire::Status Daemon::status() const {
   s.joints_alone(stats.shares.joints_alone);
   s.turning_flights(stats.shares.turning_flights);
   s.bouncing(stats.shares.bouncing);
+  if (balancer_) {
+    s.step_seconds(balancer_->load().work);
+    s.steps_on_time(balancer_->load().on_time);
+  }
+  s.transfers(stats.transfers);
+  s.cells_given(stats.cells_given);
   return s;
 }
 
@@ -270,7 +311,9 @@ Daemon::End Daemon::run() {
   report_status(wire::STATE_PREPARING, Clock::now());
   while (!stopped_.load()) {
     const auto before = Clock::now();
+    const double cpu_before = thread_cpu_seconds();
     receive_all();
+    open_lines();
     act_all();
     if (const Step limit = limit_.load(); limit != limit_known_) {
       limit_known_ = limit;
@@ -286,11 +329,14 @@ Daemon::End Daemon::run() {
     if (limit_known_ >= 0) {
       const Step front = core_->front();
       progress = core_->work();
+      if (balancer_) balance();
       send_all();
+      open_lines();
       repairs_.worked(front, *core_, Clock::now() - before);
     }
     const auto now = Clock::now();
     working_ += now - before;
+    if (balancer_) balancer_->worked(thread_cpu_seconds() - cpu_before);
     report_if_due(now);
     const bool told = feed_.report(*core_, progress != Progress::kWorked, now);
     if (state_ == wire::STATE_PREPARING && transport_.connected() && reports_.listened_to())

@@ -9,10 +9,12 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "common/scene/scene.h"
 #include "common/territory.h"
+#include "server/balance/balancer.h"
 #include "server/border/world_core.h"
 #include "server/physics/model.h"
 #include "server/world/pacer.h"
@@ -35,6 +37,7 @@ struct DaemonSettings {
   Step dump_first = -1, dump_last = -1;  // states to report; -1: none
   Step pose_every = 0;                   // steps whose poses are reported; 0: none
   bool measure = false;                  // what each way of solving islands costs
+  bool balance = true;                   // worlds that have much to do give cells to neighbours
 };
 
 class Daemon {
@@ -53,6 +56,8 @@ class Daemon {
   // An entry of the session's action log, in any order, any number of times; and how far actions are closed.
   void act(const wire::LogEntry& entry);
   void close_actions(Step step, ActionNumber logged);
+  // How fast the session is shown: times real time; 0: as fast as possible.
+  void set_pace(double pace);
   void release();  // the session has ended: who is done may leave
   void stop();     // leave as soon as possible
 
@@ -75,6 +80,9 @@ class Daemon {
   void report_status(std::uint8_t state, Clock::time_point now);
   void idle(border::Progress progress, std::chrono::milliseconds at_most);
   void act_all();
+  void open_lines();
+  soda::balance::Pace pace() const;
+  void balance();
   wire::Status status() const;
 
   const DaemonSettings settings_;
@@ -85,7 +93,9 @@ class Daemon {
   ViewFeed feed_;
   Recorder recorder_;
   std::unique_ptr<border::WorldCore> core_;
+  std::optional<soda::balance::Balancer> balancer_;
   std::vector<Line> lines_;  // by world
+  std::size_t opened_ = 0;   // of the core's neighbours, with a line and a connection
 
   std::atomic<Step> limit_{-1};                   // -1: not started
   std::mutex actions_mutex_;                      // guards what follows
@@ -93,6 +103,7 @@ class Daemon {
   Step closed_ = 0;                               // by the newest Control
   ActionNumber closed_logged_ = 0;
   bool actions_came_ = false;
+  std::atomic<double> pace_{0};
   std::atomic<bool> released_{false}, stopped_{false};
   Step limit_known_ = -1;  // by the core
 

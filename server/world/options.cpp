@@ -55,7 +55,7 @@ void check(const Options& o) {
 
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   Options o;
-  std::string sync = "anticipative", pace = "realtime", dump, expect;
+  std::string sync = "anticipative", pace = "realtime", balance = "on", dump, expect;
   CLI::App app(kAbout, "soda-world");
   app.footer(kByHand);
   app.set_version_flag("--version", std::string("soda ") + kVersion + ", protocol " + std::to_string(kProtocolVersion));
@@ -89,6 +89,10 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       ->check(CLI::Range(Step{1}, kLargestWindow))
       ->capture_default_str()
       ->group(group);
+  app.add_option("--balance", balance, "'on': worlds that have much to do give cells to their neighbours; 'off'")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str()
+      ->group(group);
   app.add_option("--input-lead", o.lead, "steps beyond the displayed one that are closed for actions")
       ->check(CLI::Range(Step{1}, kLargestLead))
       ->capture_default_str()
@@ -108,6 +112,7 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     app.parse(argc, argv);
     o.sync = parse_sync(sync);
     o.pace = parse_pace(pace);
+    o.balance = balance == "on";
     if (!expect.empty()) o.expect_scene = parse_hash(expect);
     if (!dump.empty()) std::tie(o.dump_first, o.dump_last) = parse_steps(dump);
     if (o.epoch == 0) o.epoch = std::random_device{}() | 1u;

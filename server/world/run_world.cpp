@@ -92,6 +92,7 @@ wire::Session describe(const Options& options, const EncodedScene& scene) {
   s.dump_last(options.dump_last);
   s.watched(options.supervised_by != 0);
   s.pose_every(static_cast<std::uint32_t>(options.pose_every));
+  s.balance(options.balance);
   return s;
 }
 
@@ -108,6 +109,7 @@ DaemonSettings settings_of(const wire::Session& session, const Options& options)
   settings.dump_last = session.dump_last();
   settings.pose_every = session.pose_every();
   settings.measure = options.explain;
+  settings.balance = session.balance();
   return settings;
 }
 
@@ -122,6 +124,7 @@ void obey(Daemon& daemon, const wire::Control& control) {
   }
   if (control.phase() != wire::PHASE_GATHERING) {
     daemon.close_actions(control.closed(), control.logged());
+    daemon.set_pace(control.pace());
     daemon.set_limit(control.limit());
   }
   if (control.phase() == wire::PHASE_ENDED) daemon.release();

@@ -26,9 +26,9 @@ struct Incoming {
 class Transport {
  public:
   virtual ~Transport() = default;
-  // Sets up the connections with these worlds. Once, before anything else.
+  // Sets up the connections with these worlds: once before anything else, and later with those that become neighbours.
   virtual void open(std::span<const WorldId> neighbours) = 0;
-  // Whether every neighbour has been met.
+  // Whether every neighbour has been met that there is so far.
   virtual bool connected() const = 0;
   // Hands a message over for sending, in order for each receiver; never blocks for long for the receiver's sake. What
   // cannot be sent is dropped, and kInterrupted comes for that world once it is worth trying again.
