@@ -95,7 +95,8 @@ class Policy {
   };
   struct Answer {
     WorldId world;
-    double cost;  // s per step, accepted; 0: refused
+    bool accepted;
+    double cost;  // s per step, of what was accepted
     Step until;
   };
   bool must_give(const Situation& s) const;
