@@ -35,7 +35,7 @@ std::optional<Proposal> Policy::propose(const Situation& s) {
   for (Neighbour n : s.neighbours) {
     bool refused = false;
     for (const Answer& a : answers_)
-      if (a.world == n.world) n.load.expected += a.cost, refused |= a.cost == 0;
+      if (a.world == n.world) n.load.expected += a.cost, refused |= !a.accepted;
     if (n.world != s.me && sensible(n.load.expected) && n.load.expected < settings_.dead_band * load && !refused)
       ranked_.push_back(n);
   }
@@ -68,10 +68,8 @@ std::optional<Proposal> Policy::propose(const Situation& s) {
 }
 
 void Policy::answered(Step now, const Proposal& proposal, bool accepted) {
-  if (accepted)
-    answers_.push_back({proposal.taker, proposal.cost, now + settings_.unreported});
-  else
-    answers_.push_back({proposal.taker, 0, now + settings_.refused});
+  answers_.push_back({proposal.taker, accepted, accepted ? proposal.cost : 0,
+                      now + (accepted ? settings_.unreported : settings_.refused)});
 }
 
 void Policy::took(Step now, WorldId giver, std::span<const std::uint32_t> cells) {

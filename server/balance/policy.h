@@ -52,7 +52,7 @@ struct Settings {
   // for `patience` times as long gives nothing.
   double transfer_steps = 48 + 8;
   double patience = 2;
-  Step keep = 240;               // steps for which a cell is not given back to whom it came from
+  Step keep = 120;               // steps for which a cell is not given back to whom it came from
   Step refused = 15;             // steps for which a world that refused is not asked again
   Step unreported = 30;          // steps for which a world's reports may be older than what it has accepted
   std::size_t max_cells = 4096;  // of one transfer
@@ -84,7 +84,8 @@ class Policy {
   };
   struct Answer {
     WorldId world;
-    double cost;  // s per step, accepted; 0: refused
+    bool accepted;
+    double cost;  // s per step, of what was accepted
     Step until;
   };
   bool must_give(const Situation& s) const;

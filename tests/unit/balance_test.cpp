@@ -234,11 +234,28 @@ TEST(Balance, ManySmallStepsReachAFarCrowd) {
   int steps = 0;
   while (const auto p = f.ask(policy)) {
     ASSERT_LT(++steps, 20);
+    policy.answered(f.now, *p, true);
+    f.now += Settings().unreported;  // so that the report below is a newer one
     f.apply(*p);
     f.neighbours[0].load.expected += p->cost;
     ASSERT_TRUE(connected(f.grid, f.owner, 0) && connected(f.grid, f.owner, 1)) << f.text();
   }
   EXPECT_GE(f.neighbours[0].load.expected, 6 * kMs) << f.text();
+}
+
+TEST(Balance, WhoAcceptedCellsThatCostNothingHasNotRefused) {
+  Field f({"0000000011"});
+  f.cost[0] = f.cost[1] = 5 * kMs;
+  f.knows(1, 0);
+  Settings settings;
+  settings.max_cells = 2;
+  Policy policy(settings);
+  const auto p = f.ask(policy);
+  ASSERT_TRUE(p);
+  EXPECT_EQ(p->cost, 0);
+  policy.answered(f.now, *p, true);
+  f.apply(*p);
+  EXPECT_TRUE(f.ask(policy));
 }
 
 TEST(Balance, WhoRefusedIsNotAskedAgainSoon) {
