@@ -1,7 +1,7 @@
 #include "server/balance/balancer.h"
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 #include "common/anticipation.h"
 
@@ -10,7 +10,8 @@ namespace {
 
 // What a body costs, against one that lies awake without contacts.
 constexpr double kPerContact = 0.5, kAsleep = 0.02;
-constexpr double kNewest = 0.5;  // weight of the newest measurement in the mean
+constexpr double kNewest = 0.5;   // weight of the newest measurement in the mean
+constexpr int kMostRefusals = 3;  // in a row, before the next measurement
 
 double weight(const timeline::Record& record) {
   return record.body.asleep() ? kAsleep : 1 + kPerContact * static_cast<double>(record.contacts().size());
@@ -18,12 +19,11 @@ double weight(const timeline::Record& record) {
 
 }  // namespace
 
-Balancer::Balancer(border::WorldCore& core, const Grid& grid, WorldId me, Step window, bool gives)
+Balancer::Balancer(border::WorldCore& core, const Grid& grid, WorldId me, double dt, Step window)
     : core_(core),
       grid_(grid),
       me_(me),
-      window_(window),
-      gives_(gives),
+      foresight_(dt * (static_cast<double>(border::steps_to_transfer(window)) + 0.5 * static_cast<double>(kEvery))),
       policy_([&] {
         Settings settings;
         settings.transfer_steps = static_cast<double>(border::steps_to_transfer(window));
@@ -33,35 +33,30 @@ Balancer::Balancer(border::WorldCore& core, const Grid& grid, WorldId me, Step w
 
 void Balancer::consider(const Pace& pace) {
   answer_offers();
-  if (core_.clock() < measured_at_ + kEvery) return;
-  measure(pace);
-  core_.tell_load(load_);
-  if (gives_) offer(pace);
+  hear_answer();
+  const bool due = core_.clock() >= measured_at_ + kEvery;
+  if (due) {
+    measure(pace);
+    for (const WorldId neighbour : core_.neighbours()) {
+      Load told = load_;
+      const auto leaving = leaving_.find(neighbour);
+      told.coming = leaving == leaving_.end() ? 0 : leaving->second;
+      core_.tell_load(neighbour, told);
+    }
+    refusals_ = 0;
+  }
+  if ((due || (refusals_ > 0 && refusals_ < kMostRefusals)) && !proposed_) offer(pace);
 }
 
-// The mean work of a step, spread over cells by what is in them.
+// What a step costs, in the mean, and what it will cost.
 void Balancer::measure(const Pace& pace) {
   const Step now = core_.clock();
   const double work = since_ / static_cast<double>(now - measured_at_);
   load_.work = measured_at_ == 0 ? work : (1 - kNewest) * load_.work + kNewest * work;
   since_ = 0;
   measured_at_ = now;
-
-  for (const std::uint32_t cell : costly_) cost_[cell] = 0;
-  costly_.clear();
-  double all = 0;
-  core_.states(now).for_each([&](timeline::Slot, const Ref<timeline::Record>& held) {
-    const timeline::Record& record = *held;
-    if (record.place.owner != me_) return;
-    const auto cell = static_cast<std::uint32_t>(grid_.index(grid_.cell_of(record.body.x())));
-    if (cost_[cell] == 0) costly_.push_back(cell);
-    const double share = weight(record);
-    cost_[cell] += share;
-    all += share;
-  });
-  for (const std::uint32_t cell : costly_) cost_[cell] *= load_.work / all;
-
   const std::vector<WorldId> owners = core_.owners_ahead();
+  spread_cost(now, owners);
   load_.expected = 0;
   for (const std::uint32_t cell : costly_)
     if (owners[cell] == me_) load_.expected += cost_[cell];
@@ -69,40 +64,62 @@ void Balancer::measure(const Pace& pace) {
     return std::all_of(p.cells.begin(), p.cells.end(), [&](std::uint32_t cell) { return core_.has_cell(cell); });
   });
   for (const Promise& p : promises_) load_.expected += p.cost;
+  for (const auto& [world, load] : core_.loads()) load_.expected += load.coming;
   const double ahead = static_cast<double>(std::max<Step>(0, now - pace.displayed));
   load_.on_time = pace.budget > 0 ? steps_on_time(ahead, pace.budget, load_.work) : 0;
 }
 
-double Balancer::cost_of(std::span<const std::uint32_t> cells) const {
-  double sum = 0;
-  for (const std::uint32_t cell : cells) sum += cost_[cell];
-  return sum;
+// Over the cells where bodies will be, by their present speed; those who will be in others' cells count there.
+void Balancer::spread_cost(Step now, const std::vector<WorldId>& owners) {
+  for (const std::uint32_t cell : costly_) cost_[cell] = 0;
+  costly_.clear();
+  leaving_.clear();
+  double all = 0;
+  core_.states(now).for_each([&](timeline::Slot, const Ref<timeline::Record>& held) {
+    const timeline::Record& record = *held;
+    if (record.place.owner != me_) return;
+    const Vec3 x = record.body.x();
+    const auto cell = static_cast<std::uint32_t>(grid_.index(grid_.cell_of(x + foresight_ * record.body.v())));
+    const double share = weight(record);
+    all += share;
+    if (owners[cell] != me_ && !core_.has_cell(cell)) {
+      leaving_[owners[cell]] += share;
+      return;
+    }
+    if (cost_[cell] == 0) costly_.push_back(cell);
+    cost_[cell] += share;
+  });
+  if (all == 0) return;
+  for (const std::uint32_t cell : costly_) cost_[cell] *= load_.work / all;
+  for (auto& [world, share] : leaving_) share *= load_.work / all;
 }
 
 void Balancer::answer_offers() {
   for (const border::Asked& asked : core_.take_offers()) {
+    const border::Offer& offer = asked.offer;
     const auto giver = core_.loads().find(asked.giver);
-    const bool accept =
-        !core_.giving() && giver != core_.loads().end() &&
-        may_take(grid_, core_.owners_ahead(), me_, asked.offer.cells, asked.offer.cost, load_, giver->second);
+    const bool accept = !core_.offering() && giver != core_.loads().end() &&
+                        may_take(grid_, core_.owners_ahead(), me_, offer.cells, offer.cost, load_, giver->second);
     core_.answer(asked, accept);
     if (!accept) continue;
-    promises_.push_back({asked.offer.cells, asked.offer.cost});
-    load_.expected += asked.offer.cost;
-    policy_.took(core_.clock(), asked.giver, asked.offer.cells);
+    promises_.push_back({offer.cells, offer.cost});
+    load_.expected += offer.cost;
+    policy_.took(core_.clock(), asked.giver, offer.cells);
   }
+}
+
+void Balancer::hear_answer() {
+  if (!proposed_ || core_.offering()) return;
+  const std::uint64_t before = std::exchange(declined_, core_.stats().offers_declined);
+  const bool accepted = declined_ == before;
+  policy_.answered(core_.clock(), *proposed_, accepted);
+  if (accepted) load_.expected -= std::min(load_.expected, proposed_->cost);
+  refusals_ = accepted ? 0 : refusals_ + 1;
+  proposed_.reset();
 }
 
 void Balancer::offer(const Pace& pace) {
   const Step now = core_.clock();
-  if (core_.offering()) return;
-  if (proposed_) {
-    const bool declined = core_.stats().offers_declined > declined_;
-    declined_ = core_.stats().offers_declined;
-    policy_.answered(now, *proposed_, !declined);
-    proposed_.reset();
-  }
-  if (core_.giving()) return;
   const std::vector<WorldId> owners = core_.owners_ahead();
   mine_.clear();
   for (std::uint32_t cell = 0; cell < owners.size(); ++cell)
@@ -120,7 +137,10 @@ void Balancer::offer(const Pace& pace) {
                             .budget = pace.budget,
                             .neighbours = neighbours_};
   std::optional<Proposal> proposal = policy_.propose(situation);
-  if (proposal && core_.give(proposal->taker, proposal->cells, proposal->cost)) proposed_ = std::move(proposal);
+  if (proposal && core_.give(proposal->taker, proposal->cells, proposal->cost))
+    proposed_ = std::move(proposal);
+  else
+    refusals_ = 0;
 }
 
 }  // namespace soda::balance

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/load.h"
@@ -20,8 +22,8 @@ struct Pace {
 
 class Balancer {
  public:
-  // `core` must outlive it. `window` is the session's K.
-  Balancer(border::WorldCore& core, const Grid& grid, WorldId me, Step window, bool gives = true);
+  // `core` and `grid` must outlive it. `dt`: of the scene, s; `window`: the session's K.
+  Balancer(border::WorldCore& core, const Grid& grid, WorldId me, double dt, Step window);
 
   // Work of the world, s of CPU time, since the last call.
   void worked(double seconds) { since_ += seconds; }
@@ -35,24 +37,26 @@ class Balancer {
 
  private:
   void measure(const Pace& pace);
+  void spread_cost(Step now, const std::vector<WorldId>& owners);
   void answer_offers();
+  void hear_answer();
   void offer(const Pace& pace);
-  double cost_of(std::span<const std::uint32_t> cells) const;
 
   border::WorldCore& core_;
   const Grid& grid_;
   const WorldId me_;
-  const Step window_;
-  const bool gives_;
+  const double foresight_;  // s, until a transfer agreed on now has been in effect for half as long as until the next
   Policy policy_;
   double since_ = 0;  // s of work since the last measurement
   Step measured_at_ = 0;
   Load load_;
-  std::vector<double> cost_;           // by cell: s per step of each of this world's
+  std::vector<double> cost_;           // by cell: s per step that each of this world's will cost
   std::vector<std::uint32_t> costly_;  // cells that have any
+  std::map<WorldId, double> leaving_;  // s per step, of bodies that head into others' territories
   std::vector<std::uint32_t> mine_;
   std::vector<Neighbour> neighbours_;
   std::optional<Proposal> proposed_;
+  int refusals_ = 0;            // in a row, of one measurement
   std::uint64_t declined_ = 0;  // of its offers, by the core's count
   struct Promise {
     std::vector<std::uint32_t> cells;

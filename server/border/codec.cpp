@@ -195,7 +195,8 @@ void put_territory(std::vector<std::byte>& out, const Message& message) {
     put(out, static_cast<std::uint8_t>(answer.accepted));
   }
   if (message.load)
-    for (const double value : {message.load->work, message.load->expected, message.load->on_time}) put(out, value);
+    for (const double value : {message.load->work, message.load->expected, message.load->coming, message.load->on_time})
+      put(out, value);
 }
 
 void get_territory(Reader& in, Message& message) {
@@ -225,8 +226,10 @@ void get_territory(Reader& in, Message& message) {
   Load& load = message.load.emplace();
   load.work = in.get<double>("load");
   load.expected = in.get<double>("expected load");
+  load.coming = in.get<double>("load to come");
   load.on_time = in.get<double>("steps on time");
-  if (!(load.work >= 0 && load.expected >= 0 && load.on_time >= 0) || std::isinf(load.work + load.expected))
+  if (!(load.work >= 0 && load.expected >= 0 && load.coming >= 0 && load.on_time >= 0) ||
+      std::isinf(load.work + load.expected + load.coming))
     throw CodecError("load: cannot be");
 }
 

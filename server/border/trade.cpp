@@ -9,11 +9,9 @@ bool Trade::may_give(std::size_t cell) const {
   return territories_.keeps(context_.settings.me, cell, context_.final_step);
 }
 
-bool Trade::giving() const { return offered_ || given_at_ > context_.final_step; }
-
 bool Trade::offer(WorldId taker, std::vector<std::uint32_t> cells, double cost) {
   Link* const link = context_.link_to(taker);
-  if (!link || link->since() > context_.final_step || giving() || cells.empty()) return false;
+  if (!link || link->since() > context_.final_step || offered_ || cells.empty()) return false;
   if (std::adjacent_find(cells.begin(), cells.end(), std::greater_equal()) != cells.end()) return false;
   for (const std::uint32_t cell : cells)
     if (cell >= territories_.grid().cells() || !may_give(cell)) return false;
@@ -36,15 +34,13 @@ void Trade::answered(const Link& from, const Answer& answer) {
 std::optional<Transfer> Trade::agreed() {
   if (!offered_ || !offered_->accepted) return std::nullopt;
   const WorldId me = context_.settings.me;
-  given_at_ = context_.final_step + steps_to_transfer(context_.settings.window);
-  Transfer transfer{me, territories_.known(me) + 1, given_at_, offered_->taker, std::move(offered_->cells)};
+  Transfer transfer{me, territories_.known(me) + 1, context_.final_step + steps_to_transfer(context_.settings.window),
+                    offered_->taker, std::move(offered_->cells)};
   offered_.reset();
   return transfer;
 }
 
-void Trade::offered(const Link& from, Offer offer) {
-  asked_.push_back({from.peer(), std::move(offer)});
-}
+void Trade::offered(const Link& from, Offer offer) { asked_.push_back({from.peer(), std::move(offer)}); }
 
 void Trade::answer(const Asked& asked, bool accept) {
   Link* const link = context_.link_to(asked.giver);
@@ -55,7 +51,8 @@ void Trade::answer(const Asked& asked, bool accept) {
 
 void Trade::learnt(const Transfer& transfer) {
   if (transfer.taker != context_.settings.me) return;
-  std::erase_if(promised_, [&](const Asked& a) { return a.giver == transfer.giver && a.offer.cells == transfer.cells; });
+  std::erase_if(promised_,
+                [&](const Asked& a) { return a.giver == transfer.giver && a.offer.cells == transfer.cells; });
 }
 
 std::vector<WorldId> Trade::owners_ahead() const {

@@ -40,8 +40,8 @@ class Trade {
   // Offers cells, ascending, to a neighbour. False, and nothing has happened: some may not be given, `taker` is no
   // neighbour yet, or something is being given already.
   bool offer(WorldId taker, std::vector<std::uint32_t> cells, double cost);
-  bool offering() const { return offered_.has_value(); }  // something has been offered, and is not a transfer yet
-  bool giving() const;                                    // or it is, and not the taker's yet, at final steps
+  // Something has been offered, and is not a transfer yet. (Several transfers may be on their way.)
+  bool offering() const { return offered_.has_value(); }
   void answered(const Link& from, const Answer& answer);
   // What has been accepted, as a transfer that is to be told before anything else becomes final.
   std::optional<Transfer> agreed();
@@ -67,7 +67,6 @@ class Trade {
   const Territories& territories_;
   std::optional<Offered> offered_;
   std::uint32_t offers_ = 0;
-  Step given_at_ = -1;           // step of this world's newest transfer
   std::vector<Asked> asked_;     // not answered yet
   std::vector<Asked> promised_;  // accepted, and not known as a transfer yet
 };

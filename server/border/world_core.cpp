@@ -529,14 +529,13 @@ bool WorldCore::offering() const { return impl_->trade_.offering(); }
 bool WorldCore::has_cell(std::size_t cell) const {
   return impl_->territories_.owner(cell, clock()) == impl_->settings_.me;
 }
-bool WorldCore::giving() const { return impl_->trade_.giving(); }
 bool WorldCore::may_give(std::size_t cell) const { return impl_->trade_.may_give(cell); }
 std::vector<Asked> WorldCore::take_offers() { return impl_->trade_.take_offers(); }
 void WorldCore::answer(const Asked& asked, bool accept) { impl_->trade_.answer(asked, accept); }
 std::vector<WorldId> WorldCore::owners_ahead() const { return impl_->trade_.owners_ahead(); }
 std::vector<Transfer> WorldCore::take_transfers() { return std::exchange(impl_->learnt_, {}); }
-void WorldCore::tell_load(const Load& load) {
-  for (Link& link : impl_->links_) link.add(load);
+void WorldCore::tell_load(WorldId neighbour, const Load& load) {
+  if (Link* const link = impl_->context_.link_to(neighbour)) link->add(load);
 }
 const std::map<WorldId, Load>& WorldCore::loads() const { return impl_->loads_; }
 Progress WorldCore::work() { return impl_->work(); }

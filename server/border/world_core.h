@@ -131,10 +131,9 @@ class WorldCore {
 
   // ---- cells that change hands: see trade.h
   // Asks a neighbour to take cells, ascending. False, and nothing has happened: some cannot be given, the two are not
-  // neighbours yet, or something is being given already.
+  // neighbours yet, or something is being offered already.
   bool give(WorldId taker, std::vector<std::uint32_t> cells, double cost = 0);
-  bool offering() const;  // an offer has not been answered yet
-  bool giving() const;    // or what was accepted is not the taker's yet at final steps
+  bool offering() const;  // an offer has not become a transfer, or been declined, yet
   bool may_give(std::size_t cell) const;
   bool has_cell(std::size_t cell) const;  // at the clock
   // What neighbours would like to give since the last call, each to be answered.
@@ -144,8 +143,8 @@ class WorldCore {
   std::vector<WorldId> owners_ahead() const;
   // Transfers that have become known since the last call.
   std::vector<Transfer> take_transfers();
-  void tell_load(const Load& load);              // to all neighbours
-  const std::map<WorldId, Load>& loads() const;  // what neighbours told last
+  void tell_load(WorldId neighbour, const Load& load);  // with the next message
+  const std::map<WorldId, Load>& loads() const;         // what neighbours told last
 
   // ---- work: at most one step's worth, then returns
   Progress work();

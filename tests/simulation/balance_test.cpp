@@ -18,7 +18,7 @@ namespace {
 
 // A crowd that walks from one corner of a field to the other among some who stand about.
 Scene crowd(std::uint32_t walkers) {
-  constexpr double kSeconds = 15;
+  constexpr double kSeconds = 30;
   SceneBuilder builder("crowd");
   builder.scene.sleeping = false;
   builder.scene.gravity = Vec3::Zero();
@@ -58,7 +58,7 @@ class Lockstep {
           *models_[w], map_,
           border::CoreSettings{.me = w, .epoch = 1, .session = 9, .last_step = steps, .balance = balance},
           digests_[w]));
-      balancers_.push_back(std::make_unique<balance::Balancer>(*cores_[w], map_.grid, w, 48));
+      balancers_.push_back(std::make_unique<balance::Balancer>(*cores_[w], map_.grid, w, scene.dt, 48));
     }
     computed_.resize(worlds);
   }
@@ -147,8 +147,8 @@ Walked walk(const Scene& scene, WorldId worlds, Step steps, bool balance) {
 }
 
 TEST(Balance, FollowsACrowdFromCornerToCorner) {
-  const Scene scene = crowd(1500);
-  const Step steps = 900;
+  const Scene scene = crowd(1200);
+  const Step steps = 1800;
   const Walked off = walk(scene, 4, steps, false), on = walk(scene, 4, steps, true);
   std::printf("slowest world's load over the mean: %.2f, without balancing %.2f; %d transfers\n", on.worst, off.worst,
               on.transfers);

@@ -47,7 +47,7 @@ class Messages : public testing::Test {
     message_.transfers = {{1, 1, 180, 0, {2, 3, 9}}, {2, 4, 200, 1, {7}}};
     message_.offers = {{3, 0.01, {4, 5}}};
     message_.answers = {{8, true}, {9, false}};
-    message_.load = {0.01, 0.02, std::numeric_limits<double>::infinity()};
+    message_.load = {0.01, 0.02, 0.001, std::numeric_limits<double>::infinity()};
   }
 
   physics::Model model_;

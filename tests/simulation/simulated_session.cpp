@@ -191,7 +191,7 @@ class Session {
   void trade(border::WorldCore& core) {
     for (const border::Asked& asked : core.take_offers()) core.answer(asked, trade_random_() % 5 != 0);
     const double now = static_cast<double>(trade_random_() >> 11) * 0x1p-53;
-    if (now >= network_.give_share || core.giving() || core.neighbours().empty()) return;
+    if (now >= network_.give_share || core.offering() || core.neighbours().empty()) return;
     const WorldId taker = core.neighbours()[trade_random_() % core.neighbours().size()];
     const auto one_in = std::vector<std::uint64_t>{1, 2, 10}[trade_random_() % 3];
     std::vector<std::uint32_t> cells;
