@@ -112,6 +112,40 @@ TEST_F(Command, TerritoriesByHandChangeNoBit) {
   expect_bad(with({"run", piles, "--worlds", "1", "--territories", path("bad.txtpb")}), "territory[0].min.x");
 }
 
+// One world has nearly everything at the start: cells change hands while the session runs, or not, and no bit changes.
+TEST_F(Command, BalancingChangesNoBit) {
+  const std::string city = scene("city", 1000);
+  std::ofstream(path("hand.txtpb"))
+      << "territory { world: 1 min { x: 8 y: 8 z: -1000 } max { x: 1000 y: 1000 z: 1000 } }\n"
+         "territory { world: 2 min { x: 8 y: -1000 z: -1000 } max { x: 1000 y: 8 z: 1000 } }\n"
+         "territory { world: 0 min { x: -1000 y: -1000 z: -1000 } max { x: 8 y: 1000 z: 1000 } }\n";
+  const std::vector<std::string> common = {"--steps", "400", "-q"};
+  const auto with = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), common.begin(), common.end());
+    return arguments;
+  };
+  run(with({"run", city, "--sync", "single", "--pace", "max", "--hash-log", path("one.log")}));
+  struct Way {
+    const char *balance, *sync, *pace;
+  };
+  for (const Way& way : {Way{"off", "anticipative", "max"}, Way{"on", "anticipative", "max"},
+                         Way{"on", "conservative", "max"}, Way{"on", "anticipative", "3"}}) {
+    const std::string name = std::string(way.balance) + way.sync + way.pace;
+    SCOPED_TRACE(name);
+    run(with({"run", city, "--worlds", "3", "--territories", path("hand.txtpb"), "--balance", way.balance, "--sync",
+              way.sync, "--pace", way.pace, "--hash-log", path(name + ".log"), "--stats", path(name)}));
+    expect_equal_logs(path("one.log"), path(name + ".log"));
+    const double transfers = stat(path(name), "transfers");
+    std::printf("%s: %g transfers of %g cells\n", name.c_str(), transfers, stat(path(name), "cells_given"));
+    if (std::string(way.balance) == "off") {
+      EXPECT_EQ(transfers, 0);
+    } else if (std::string(way.pace) == "max") {
+      EXPECT_GT(transfers, 2);
+    }
+  }
+  expect_bad({"run", city, "--balance", "maybe"}, "--balance");
+}
+
 TEST_F(Command, DiffNamesTheFirstStepThatDiffers) {
   const std::string file = scene("cubes", 50);
   run({"run", file, "--sync", "single", "--steps", "20", "--pace", "max", "--hash-log", path("a.log")});
