@@ -97,6 +97,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       ->check(CLI::Range(Step{1}, kLargestLead))
       ->capture_default_str()
       ->group(group);
+  app.add_flag("--watched", o.watched, "begin only once all worlds' reports have a reader, such as `soda watch`")
+      ->group(group);
   app.add_option("--actions", o.actions, "file of actions (see docs/actions.md)")->group(group);
   app.add_option("--dump-steps", dump, "A[:B]: report the whole states of these steps")->group(group);
   dds::add_network_options(app, o.network);

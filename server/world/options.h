@@ -28,6 +28,7 @@ struct Options {
   double pace = 1;  // multiple of real time; 0: as fast as possible
   Step window = kDefaultWindow;
   bool balance = true;
+  bool watched = false;
   Step lead = kDefaultLead;
   std::string actions;  // file
   int actions_fd = -1;  // of an encoded pb.ActionFile, instead

@@ -90,7 +90,7 @@ wire::Session describe(const Options& options, const EncodedScene& scene) {
   s.pace(options.pace);
   s.dump_first(options.dump_first);
   s.dump_last(options.dump_last);
-  s.watched(options.supervised_by != 0);
+  s.watched(options.supervised_by != 0 || options.watched);
   s.pose_every(static_cast<std::uint32_t>(options.pose_every));
   s.balance(options.balance);
   return s;
@@ -207,8 +207,8 @@ int run_host(const Options& options, StopSignals& signals) {
   EncodedScene scene = scene_of(options);
   const wire::Session session = describe(options, scene);
   dds::Participant participant(options.network, options.session, "soda-world-0");
-  DdsReports reports(participant, session.instance(), options.world, options.supervised_by != 0,
-                     session.dump_first() >= 0, session.pose_every() > 0, [&] { return signals.received() != 0; });
+  DdsReports reports(participant, session.instance(), options.world, session.watched(), session.dump_first() >= 0,
+                     session.pose_every() > 0, [&] { return signals.received() != 0; });
   DdsTransport transport(participant, options.world);
   const auto shared = std::make_shared<const Scene>(scene.scene);
   std::vector<WantedAction> actions = actions_of(options, *shared);

@@ -21,7 +21,7 @@ class ByHand : public SessionTest {
   std::vector<std::string> host(const std::string& session, int worlds, const std::vector<std::string>& more) const {
     std::vector<std::string> words =
         soda_world({"--session", session, "--world", "0", "--worlds", std::to_string(worlds), "--scene", file_,
-                    "--steps", "200", "--pace", "max"});
+                    "--steps", "200", "--pace", "max", "--watched"});
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
