@@ -33,10 +33,10 @@ constexpr Mode kModes[] = {kAnticipative, kConservative, kBarrier};
 struct Size {
   std::uint32_t bodies, bodies_per_world;  // of strong scaling, of weak scaling
   std::vector<WorldId> strong, weak;       // without those that both have
-  Step settle, steps;                      // before what is measured, and measured
+  Step steps;
 };
-const Size kFull{64000, 1000, {1, 2, 4, 16, 64, 256, 1024}, {1, 4, 16}, 20, 40};
-const Size kQuick{2000, 250, {1, 2, 4, 8}, {1, 2}, 6, 12};
+const Size kFull{64000, 1000, {1, 2, 4, 16, 64, 256, 1024}, {1, 4, 16}, 60};
+const Size kQuick{2000, 250, {1, 2, 4, 8}, {1, 2}, 20};
 
 // What a run of the model says; times are s per step and world.
 struct Outcome {
@@ -46,20 +46,20 @@ struct Outcome {
   double bodies_max_over_mean = 0;
   double messages = 0, bytes = 0;  // per step and world
   double mixed_islands = 0;        // per step, in all
+  double redone = 0;               // share of all results
   double sum_busy(WorldId worlds) const { return busy_mean * worlds; }
 };
 
-// From when the slowest world has made step `settle` final until it has made final as many more as are measured; the
-// session goes on beyond, so that nobody idles at its end.
+// A whole session of so many steps, from the scene to when the last of them is final everywhere. (Between two steps on
+// the way those who run ahead would have done more, or less, than what lies between.)
 class Run {
  public:
-  Run(const Scene& scene, WorldId worlds, const Mode& mode, const Network& network, const Size& size)
+  Run(const Scene& scene, WorldId worlds, const Mode& mode, const Network& network, Step steps)
       : mode_(mode),
         latency_(network.latency),
-        settle_(size.settle),
-        steps_(size.steps),
+        steps_(steps),
         cluster_(scene, bisect(scene, make_grid(scene), worlds),
-                 {.last_step = settle_ + steps_ + 2 * kWindow, .sync = mode.sync, .window = kWindow}, network, costs_),
+                 {.last_step = steps, .sync = mode.sync, .window = kWindow}, network, costs_),
         final_(worlds, 0),
         front_(worlds, 0) {
     cluster_.worked = [this](WorldId w) { worked(w); };
@@ -68,62 +68,39 @@ class Run {
 
   Outcome outcome() {
     cluster_.run();
-    const Snapshot end = snapshot();
     Outcome o;
     const auto steps = static_cast<double>(steps_);
-    const auto worlds = static_cast<double>(cluster_.worlds());
-    o.step = (end.time - begin_->time) / steps;
-    double bodies_max = 0, bodies = 0;
+    const double worlds = cluster_.worlds();
+    o.step = cluster_.now() / steps;
+    double bodies_max = 0, bodies = 0, redone = 0, computed = 0;
     for (WorldId w = 0; w < cluster_.worlds(); ++w) {
-      double busy = 0;
-      for (std::size_t a = 0; a < kActivities; ++a) {
-        const double seconds = (end.usage[w].seconds[a] - begin_->usage[w].seconds[a]) / steps;
-        o.mean[a] += seconds / worlds;
-        busy += seconds;
-      }
-      o.busy_mean += busy / worlds;
-      o.busy_max = std::max(o.busy_max, busy);
-      const auto own = static_cast<double>(cluster_.core(w).own_bodies());
+      const border::WorldCore& core = cluster_.core(w);
+      const Cluster::Usage& usage = cluster_.usage(w);
+      for (std::size_t a = 0; a < kActivities; ++a) o.mean[a] += usage.seconds[a] / steps / worlds;
+      o.busy_mean += usage.busy() / steps / worlds;
+      o.busy_max = std::max(o.busy_max, usage.busy() / steps);
+      const auto own = static_cast<double>(core.own_bodies());
       bodies += own;
       bodies_max = std::max(bodies_max, own);
+      o.messages += static_cast<double>(core.stats().messages_sent) / steps / worlds;
+      o.bytes += static_cast<double>(core.stats().bytes_sent) / steps / worlds;
+      o.mixed_islands += static_cast<double>(core.stats().mixed_islands) / steps;
+      redone += static_cast<double>(bodies_redone(core));
+      computed += static_cast<double>(bodies_computed(core));
     }
     o.bodies_max_over_mean = bodies_max / (bodies / worlds);
-    o.messages = (end.messages - begin_->messages) / steps / worlds;
-    o.bytes = (end.bytes - begin_->bytes) / steps / worlds;
-    o.mixed_islands = (end.mixed - begin_->mixed) / steps;
+    o.redone = redone / computed;
     return o;
   }
 
  private:
-  struct Snapshot {
-    double time;
-    std::vector<Cluster::Usage> usage;
-    double messages = 0, bytes = 0, mixed = 0;
-  };
-  Snapshot snapshot() const {
-    Snapshot s{cluster_.now(), {}};
-    for (WorldId w = 0; w < cluster_.worlds(); ++w) {
-      const border::CoreStats& stats = cluster_.core(w).stats();
-      s.usage.push_back(cluster_.usage(w));
-      s.messages += static_cast<double>(stats.messages_sent);
-      s.bytes += static_cast<double>(stats.bytes_sent);
-      s.mixed += static_cast<double>(stats.mixed_islands);
-    }
-    return s;
-  }
-
   void worked(WorldId w) {
     if (mode_.barrier && pass(front_, w, cluster_.core(w).front(), limit_)) {
       // Word of it goes up a binary tree of all worlds, and down again.
       const int levels = static_cast<int>(std::bit_width(cluster_.worlds() - 1u));
       cluster_.at(cluster_.now() + 2 * levels * latency_, [this, next = limit_ + 1] { order_all(next); });
     }
-    const Step goal = begin_ ? settle_ + steps_ : settle_;
-    if (!pass(final_, w, cluster_.core(w).final_step(), goal)) return;
-    if (begin_)
-      cluster_.stop();
-    else
-      begin_ = snapshot();
+    if (pass(final_, w, cluster_.core(w).final_step(), steps_)) cluster_.stop();
   }
 
   // Notes how far a world has got; whether all have now got to `goal`, and had not before.
@@ -139,12 +116,11 @@ class Run {
 
   const Mode mode_;
   const double latency_;  // s
-  const Step settle_, steps_;
+  const Step steps_;
   MeasuredCosts costs_;
   Cluster cluster_;
   std::vector<Step> final_, front_;  // by world
   Step limit_ = 0;                   // of the barrier
-  std::optional<Snapshot> begin_;
 };
 
 class Tables {
@@ -158,7 +134,7 @@ class Tables {
   // `one`: the time of a step on one world, of all bodies (strong) or of as many as each has (weak).
   void add(const char* kind, const Mode& mode, WorldId worlds, std::uint32_t bodies, const Outcome& o, double one,
            const Network& network) {
-    const bool strong = kind == std::string("strong");
+    const bool strong = kind != std::string("weak");
     const double n = worlds, work_of_one = strong ? one : n * one;
     const double speedup = work_of_one / o.step, efficiency = speedup / n;
     table_.row(kind, mode.name, worlds, bodies, 1e3 * o.step, speedup, efficiency, 1 - o.busy_mean / o.step,
@@ -170,6 +146,9 @@ class Tables {
         "work x %.3f uneven x %.3f waiting of the busiest); waiting %.0f %%\n",
         kind, mode.name, worlds, bodies / n, 1e3 * o.step, speedup, efficiency, o.sum_busy(worlds) / work_of_one,
         o.busy_max / o.busy_mean, o.step / o.busy_max, 100 * (1 - o.busy_mean / o.step));
+    std::printf("   receiving %.2f working %.2f telling %.2f network %.2f ms; messages %.1f bytes %.0f mixed %.1f redone %.2f bodies max %.2f\n", 1e3 * o.mean[0],
+               1e3 * o.mean[1], 1e3 * o.mean[2], 1e3 * o.mean[3], o.messages, o.bytes,
+               o.mixed_islands, o.redone, o.bodies_max_over_mean);
     std::fflush(stdout);
   }
   void close() { table_.close(); }
@@ -182,18 +161,6 @@ Scene city(std::uint32_t bodies) {
   Scene scene = generate("city", bodies, 1);
   scene.sleeping = false;  // else it soon costs nothing
   return scene;
-}
-
-// What real processes take per step: the difference of a long and a short run, so that the start does not count.
-struct Real {
-  double wall = 0, cpu = 0;  // s per step; of all worlds
-};
-
-Real real_run(const SessionRuns& runs, WorldId worlds, const Size& size) {
-  const std::string arguments = "--worlds " + std::to_string(worlds) + " --no-shm";
-  const SessionRun shorter = runs.run(arguments, size.settle), longer = runs.run(arguments, size.settle + size.steps);
-  const auto steps = static_cast<double>(size.steps);
-  return {(longer.wall - shorter.wall) / steps, (longer.cpu - shorter.cpu) / steps};
 }
 
 constexpr const char* kPicture = R"(
@@ -227,7 +194,8 @@ unset multiplot
 }  // namespace
 
 void scaling(const Options& options, Headline& headline) {
-  const Size& size = options.quick ? kQuick : kFull;
+  Size size = options.quick ? kQuick : kFull;
+  if (const char* dev = std::getenv("SCALING_DEV")) size.strong = {1, static_cast<WorldId>(std::atoi(dev))}, size.weak={1}, size.bodies = std::atoi(std::getenv("SCALING_BODIES"));
   Network network = measure_messages(options.quick);
   network.bytes_per_second = kGigabit;
   headline.add("latency_us", 1e6 * network.latency);
@@ -244,7 +212,7 @@ void scaling(const Options& options, Headline& headline) {
   for (const WorldId worlds : size.strong)
     for (const Mode& mode : kModes) {
       if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;  // all the same
-      const Outcome o = Run(whole, worlds, mode, network, size).outcome();
+      const Outcome o = Run(whole, worlds, mode, network, size.steps).outcome();
       if (worlds == 1) one = o.step;
       tables.add("strong", mode, worlds, size.bodies, o, one, network);
       const std::string end = std::to_string(worlds) + (&mode == kModes ? "" : std::string("_") + mode.name);
@@ -258,7 +226,7 @@ void scaling(const Options& options, Headline& headline) {
       headline.add("city.busiest_waits_" + end, o.step / o.busy_max);
       Network slow = network;
       slow.latency *= 10;
-      const Outcome late = Run(whole, worlds, mode, slow, size).outcome();
+      const Outcome late = Run(whole, worlds, mode, slow, size.steps).outcome();
       tables.add("strong, latency x 10", mode, worlds, size.bodies, late, one, slow);
       headline.add("city.efficiency_" + end + "_latency_x10", one / late.step / worlds);
     }
@@ -269,7 +237,7 @@ void scaling(const Options& options, Headline& headline) {
     const Scene scene = city(bodies);
     for (const Mode& mode : kModes) {
       if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;
-      const Outcome o = Run(scene, worlds, mode, network, size).outcome();
+      const Outcome o = Run(scene, worlds, mode, network, size.steps).outcome();
       if (worlds == 1) one_of_weak = o.step;
       tables.add("weak", mode, worlds, bodies, o, one_of_weak, network);
       if (worlds == size.weak.back()) headline.add(std::string("weak.efficiency_") + std::to_string(worlds) + "_" + mode.name, one_of_weak / o.step);
@@ -287,9 +255,10 @@ void scaling(const Options& options, Headline& headline) {
   std::vector<std::vector<double>> wall(compared.size()), cpu(compared.size());
   for (int round = 0; round < rounds; ++round)
     for (std::size_t i = 0; i < compared.size(); ++i) {
-      const Real real = real_run(runs, compared[i].first, size);
-      wall[i].push_back(real.wall);
-      cpu[i].push_back(real.cpu);
+      const SessionRun real =
+          runs.run("--worlds " + std::to_string(compared[i].first) + " --no-shm", size.steps);
+      wall[i].push_back(real.wall / static_cast<double>(size.steps));
+      cpu[i].push_back(real.cpu / static_cast<double>(size.steps));
     }
   for (std::size_t i = 0; i < compared.size(); ++i) {
     const auto& [worlds, o] = compared[i];
