@@ -5,23 +5,53 @@
 #include <utility>
 
 #include "bench/clocks.h"
+#include "common/scene/generators.h"
 
 namespace soda::bench {
 
-void MeasuredCosts::begin(const border::WorldCore&) { since_ = cpu_seconds(); }
-
-double MeasuredCosts::spent(WorldId, const border::WorldCore&, Activity, double) {
-  const double now = cpu_seconds();
-  return now - std::exchange(since_, now);
+Yardstick::Yardstick() : model_(generate("piles", 324, 1)), stepper_(model_), start_(model_.initial_state()) {
+  for (int i = 0; i < 30; ++i) stepper_.step(start_);
+  at_first_ = seconds();
+  for (int i = 0; i < 100; ++i) at_first_ = std::min(at_first_, seconds());
 }
 
-Cluster::Cluster(const Scene& scene, const TerritoryMap& map, border::CoreSettings settings, const Network& network,
-                 Costs& costs)
-    : network_(network), costs_(costs), model_(scene), map_(map), worlds_(map.worlds) {
-  for (WorldId w = 0; w < worlds(); ++w) {
-    settings.me = w;
-    worlds_[w].core = std::make_unique<border::WorldCore>(model_, map_, settings, ignores_);
-  }
+double Yardstick::seconds() {
+  BodySet set = start_;
+  const double begun = cpu_seconds();
+  for (int i = 0; i < 4; ++i) stepper_.step(set);
+  return cpu_seconds() - begun;
+}
+
+double Yardstick::slowness() {
+  (void)seconds();  // brings it into the cache
+  std::array<double, 3> some{seconds(), seconds(), seconds()};
+  std::sort(some.begin(), some.end());
+  return some[1] / at_first_;
+}
+
+void MeasuredCosts::begin(const border::WorldCore&) {
+  constexpr double kEvery = 0.2;  // s of CPU time: others begin and end all the time
+  since_ = cpu_seconds();
+  if (!yardstick_ || since_ < known_at_ + kEvery) return;
+  slowness_ = yardstick_->slowness();
+  known_at_ = since_ = cpu_seconds();
+}
+
+double MeasuredCosts::spent(WorldId, const border::WorldCore&, Activity activity, double) {
+  const double now = cpu_seconds();
+  return factors[static_cast<std::size_t>(activity)] / slowness_ * (now - std::exchange(since_, now));
+}
+
+Cluster::Cluster(const Scene& scene, const TerritoryMap& map, const border::CoreSettings& settings,
+                 const Network& network, Costs& costs)
+    : settings_(settings), network_(network), costs_(costs), model_(scene), map_(map), worlds_(map.worlds) {
+  for (WorldId w = 0; w < worlds(); ++w) worlds_[w].core = make_core(w);
+}
+
+std::unique_ptr<border::WorldCore> Cluster::make_core(WorldId w) {
+  border::CoreSettings settings = settings_;
+  settings.me = w;
+  return std::make_unique<border::WorldCore>(model_, map_, settings, ignores_);
 }
 
 void Cluster::at(double time, std::function<void()> happens) {
@@ -30,7 +60,7 @@ void Cluster::at(double time, std::function<void()> happens) {
 }
 
 void Cluster::order(WorldId w, const Order& order) {
-  worlds_[w].order = order;
+  worlds_[w].next.order = order;
   if (running_) look(w);
 }
 
@@ -47,47 +77,61 @@ void Cluster::run() {
   }
 }
 
+Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, const Piece& piece, Costs& costs, Usage& usage) const {
+  Done done{};
+  const auto spend = [&](Activity activity, double seconds) {
+    usage.seconds[static_cast<std::size_t>(activity)] += seconds;
+    done.seconds += seconds;
+  };
+  const auto measure = [&](Activity activity) { spend(activity, costs.spent(w, core, activity, now_)); };
+  costs.begin(core);
+  if (piece.order) {
+    core.set_limit(piece.order->limit);
+    core.close_actions(piece.order->closed, 0);
+  }
+  double network = 0;
+  for (const auto& bytes : piece.messages) {
+    if (!core.receive(bytes)) throw std::runtime_error(core.last_refusal());
+    network += network_.receive_seconds + network_.receive_seconds_per_byte * static_cast<double>(bytes.size());
+  }
+  measure(Activity::kReceiving);
+  done.worked = core.work() == border::Progress::kWorked;
+  measure(Activity::kWorking);
+  done.out = core.take_outgoing();
+  measure(Activity::kTelling);
+  for (const border::Outgoing& message : done.out)
+    network += network_.send_seconds + network_.send_seconds_per_byte * static_cast<double>(message.bytes.size());
+  spend(Activity::kNetwork, network);
+  usage.pieces += done.worked;
+  return done;
+}
+
+Cluster::Usage Cluster::replay(WorldId w, Costs& costs) {
+  const auto core = make_core(w);
+  Usage usage;
+  for (const Piece& piece : worlds_[w].pieces) (void)work(w, *core, piece, costs, usage);
+  return usage;
+}
+
 // A world that is not busy takes what has come, and does what it can.
 void Cluster::look(WorldId w) {
   World& world = worlds_[w];
-  border::WorldCore& core = *world.core;
   bool more = true;
   while (more && !world.busy && !stopped_) {
-    double took = 0;
-    const auto spend = [&](Activity activity, double seconds) {
-      world.usage.seconds[static_cast<std::size_t>(activity)] += seconds;
-      took += seconds;
-    };
-    const auto measure = [&](Activity activity) { spend(activity, costs_.spent(w, core, activity, now_)); };
-    costs_.begin(core);
-    if (const auto order = std::exchange(world.order, std::nullopt)) {
-      core.set_limit(order->limit);
-      core.close_actions(order->closed, 0);
-    }
-    double network = 0;
-    for (const auto& bytes : world.inbox) {
-      if (!core.receive(bytes)) throw std::runtime_error(core.last_refusal());
-      network += network_.receive_seconds + network_.receive_seconds_per_byte * static_cast<double>(bytes.size());
-    }
-    world.inbox.clear();
-    measure(Activity::kReceiving);
-    more = core.work() == border::Progress::kWorked;
-    measure(Activity::kWorking);
-    std::vector<border::Outgoing> out = core.take_outgoing();
-    measure(Activity::kTelling);
-    for (const border::Outgoing& message : out)
-      network += network_.send_seconds + network_.send_seconds_per_byte * static_cast<double>(message.bytes.size());
-    spend(Activity::kNetwork, network);
-    if (!(took > 0)) {
-      hand_over(w, std::move(out));
+    Piece piece = std::exchange(world.next, {});
+    Done done = work(w, *world.core, piece, costs_, world.usage);
+    if (world.recorded) world.pieces.push_back(std::move(piece));
+    more = done.worked;
+    if (!(done.seconds > 0)) {
+      hand_over(w, std::move(done.out));
       continue;
     }
     world.busy = true;  // what has come of it is known afterwards
-    at(now_ + took, [this, w, more, out = std::move(out)]() mutable {
-      World& done = worlds_[w];
-      done.busy = false;
+    at(now_ + done.seconds, [this, w, more, out = std::move(done.out)]() mutable {
+      World& ready = worlds_[w];
+      ready.busy = false;
       hand_over(w, std::move(out));
-      if (more || !done.inbox.empty() || done.order) look(w);
+      if (more || !ready.next.messages.empty() || ready.next.order) look(w);
     });
   }
 }
@@ -97,7 +141,7 @@ void Cluster::hand_over(WorldId w, std::vector<border::Outgoing> out) {
   for (border::Outgoing& message : out) {
     free = std::max(free, now_) + static_cast<double>(message.bytes.size()) / network_.bytes_per_second;
     at(free + network_.latency, [this, to = message.to, bytes = std::move(message.bytes)]() mutable {
-      worlds_[to].inbox.push_back(std::move(bytes));
+      worlds_[to].next.messages.push_back(std::move(bytes));
       look(to);
     });
   }

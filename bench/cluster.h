@@ -16,14 +16,15 @@
 #include "common/territory.h"
 #include "server/border/world_core.h"
 #include "server/physics/model.h"
+#include "server/physics/stepper.h"
 
 namespace soda::bench {
 
 // What a message costs, between any two machines.
 struct Network {
-  double latency = 0;                                             // s, from a machine to another
-  double bytes_per_second = std::numeric_limits<double>::max();   // that leave a machine, one message after another
-  double send_seconds = 0, receive_seconds = 0;                   // of the processor, for a message
+  double latency = 0;                                              // s, from a machine to another
+  double bytes_per_second = std::numeric_limits<double>::max();    // that leave a machine, one message after another
+  double send_seconds = 0, receive_seconds = 0;                    // of the processor, for a message
   double send_seconds_per_byte = 0, receive_seconds_per_byte = 0;  // and for each of its bytes
 };
 
@@ -39,13 +40,33 @@ class Costs {
   virtual double spent(WorldId world, const border::WorldCore& core, Activity activity, double now) = 0;
 };
 
-// What it costs here: CPU time of this thread.
+// How fast this processor is just now: who shares it with others, or its caches, gets the same done in more CPU time.
+// By the steps of a small scene that stays in a cache.
+class Yardstick {
+ public:
+  Yardstick();
+  double slowness();  // over when it was made; takes some milliseconds
+
+ private:
+  double seconds();  // for the same work each time
+  physics::Model model_;
+  physics::Stepper stepper_;
+  BodySet start_;
+  double at_first_ = 0;  // s, at best
+};
+
+// What it costs here: CPU time of this thread, times a factor by Activity; as if the processor were always as fast as
+// when the yardstick was made, if there is one. (Preemption is not in it, but what others leave in the caches is.)
 class MeasuredCosts final : public Costs {
  public:
+  explicit MeasuredCosts(Yardstick* yardstick = nullptr) : yardstick_(yardstick) {}
+  std::array<double, kActivities> factors{1, 1, 1, 1};
   void begin(const border::WorldCore& core) override;
   double spent(WorldId world, const border::WorldCore& core, Activity activity, double now) override;
 
  private:
+  Yardstick* const yardstick_;
+  double slowness_ = 1, known_at_ = -1e9;  // s of CPU time
   double since_ = 0;
 };
 
@@ -57,11 +78,12 @@ class Cluster {
   };
   struct Usage {
     std::array<double, kActivities> seconds{};  // by Activity
+    std::uint64_t pieces = 0;                   // of work that did something
     double busy() const { return seconds[0] + seconds[1] + seconds[2] + seconds[3]; }
   };
 
   // `settings.me` is set for each world. `costs` must outlive the cluster.
-  Cluster(const Scene& scene, const TerritoryMap& map, border::CoreSettings settings, const Network& network,
+  Cluster(const Scene& scene, const TerritoryMap& map, const border::CoreSettings& settings, const Network& network,
           Costs& costs);
 
   // Called when a world has done something, what it says has left it, and it is not busy.
@@ -78,6 +100,12 @@ class Cluster {
   void run();
   void stop() { stopped_ = true; }
 
+  // Before run(): keeps what a world is given, so that replay() can do the same again with a fresh core, piece by
+  // piece, and the cluster out of the way: what the world costs on a machine of its own, whose caches it need not
+  // share.
+  void record(WorldId w) { worlds_[w].recorded = true; }
+  Usage replay(WorldId w, Costs& costs);
+
  private:
   struct Event {
     double time;
@@ -85,17 +113,29 @@ class Cluster {
     std::function<void()> happens;
     bool operator<(const Event& o) const { return time != o.time ? time > o.time : number > o.number; }
   };
+  struct Piece {  // what a world is given before it works
+    std::optional<Order> order;
+    std::vector<std::vector<std::byte>> messages;
+  };
   struct World {
     std::unique_ptr<border::WorldCore> core;
-    std::vector<std::vector<std::byte>> inbox;  // what came while it was busy
-    std::optional<Order> order;                 // likewise
-    bool busy = false;
+    Piece next;  // what came while it was busy
+    bool busy = false, recorded = false;
+    std::vector<Piece> pieces;
     double line_free = 0;  // when all that it has sent has left
     Usage usage;
   };
+  struct Done {
+    bool worked;
+    double seconds;
+    std::vector<border::Outgoing> out;
+  };
+  std::unique_ptr<border::WorldCore> make_core(WorldId w);
+  Done work(WorldId w, border::WorldCore& core, const Piece& piece, Costs& costs, Usage& usage) const;
   void look(WorldId w);
   void hand_over(WorldId w, std::vector<border::Outgoing> out);
 
+  const border::CoreSettings settings_;
   const Network network_;
   Costs& costs_;
   border::Observer ignores_;

@@ -88,10 +88,9 @@ class VirtualSession {
   VirtualSession(const Scene& scene, border::Sync sync, const Pacing& pacing, double cost)
       : pacing_(pacing),
         costs_(cost),
-        cluster_(
-            scene, bisect(scene, make_grid(scene), 2),
-            {.last_step = pacing.paced ? kFar : pacing.steps, .sync = sync, .window = kWindow, .actions = true},
-            {.latency = kMessage}, costs_) {
+        cluster_(scene, bisect(scene, make_grid(scene), 2),
+                 {.last_step = pacing.paced ? kFar : pacing.steps, .sync = sync, .window = kWindow, .actions = true},
+                 {.latency = kMessage}, costs_) {
     for (WorldId w = 0; w < 2; ++w)
       cluster_.order(w, pacing.paced ? Cluster::Order{kWindow, pacing.lead} : Cluster::Order{kFar, kFar});
     cluster_.worked = [this](WorldId w) { told(w); };

@@ -28,7 +28,8 @@ constexpr std::size_t kFarewell = 1;
 constexpr int kBurst = 8;  // messages at once: a world tells its neighbours what it has computed
 
 struct End {
-  End(const std::string& session, WorldId me) : participant(options(), session, "soda-bench"), transport(participant, me) {
+  End(const std::string& session, WorldId me)
+      : participant(options(), session, "soda-bench"), transport(participant, me) {
     const WorldId other = 1 - me;
     transport.open(std::span(&other, 1));
   }
@@ -74,26 +75,24 @@ struct Sample {
 
 // `burst` messages at once, to the other process and back; again and again.
 Sample measure(End& end, std::size_t bytes, int burst, int bursts) {
-  std::vector<double> round_trips;
-  double sending = 0;
-  const double before = process_seconds();
+  std::vector<double> round_trips, sending, receiving;
   for (int i = 0; i < bursts; ++i) {
+    const double before = process_seconds(), send_begun = cpu_seconds();
     const auto sent_at = Clock::now();
-    const double send_begun = cpu_seconds();
     for (int k = 0; k < burst; ++k) end.transport.send(1, std::vector<std::byte>(bytes));
-    sending += cpu_seconds() - send_begun;
+    sending.push_back(cpu_seconds() - send_begun);
     for (int k = 0; k < burst; ++k)
       if (const auto back = end.next(); !back || back->size() != bytes)
         throw std::runtime_error("messages to another process on this machine get lost");
     round_trips.push_back(std::chrono::duration<double>(Clock::now() - sent_at).count());
+    // What is not sending is receiving, on whichever thread.
+    receiving.push_back(process_seconds() - before - sending.back());
   }
-  const double messages = burst * bursts;
-  return {static_cast<double>(bytes), median(round_trips) / 2, sending / messages,
-          (process_seconds() - before - sending) / messages};  // what is not sending is receiving, on whichever thread
+  return {static_cast<double>(bytes), median(round_trips) / 2, median(sending) / burst, median(receiving) / burst};
 }
 
 // The line through the smallest and the largest message: what is in between lies below it.
-void fit(double Sample::* cost, const Sample& small, const Sample& large, double& at_zero, double& per_byte) {
+void fit(double Sample::*cost, const Sample& small, const Sample& large, double& at_zero, double& per_byte) {
   per_byte = std::max(0.0, (large.*cost - small.*cost) / (large.bytes - small.bytes));
   at_zero = small.*cost - per_byte * small.bytes;
 }
@@ -132,8 +131,9 @@ Network measure_messages(bool quick) {
     waitpid(other, nullptr, 0);
   }
   for (const Sample& s : samples)
-    std::printf("a message of %5.0f bytes over DDS, UDP: %3.0f us on its way; CPU %3.0f us to send, %3.0f us to receive\n",
-                s.bytes, 1e6 * s.one_way, 1e6 * s.send, 1e6 * s.receive);
+    std::printf(
+        "a message of %5.0f bytes over DDS, UDP: %3.0f us on its way; CPU %3.0f us to send, %3.0f us to receive\n",
+        s.bytes, 1e6 * s.one_way, 1e6 * s.send, 1e6 * s.receive);
   Network network;
   network.latency = samples.front().one_way;
   fit(&Sample::send, samples.front(), samples.back(), network.send_seconds, network.send_seconds_per_byte);

@@ -7,8 +7,8 @@
 #include <functional>
 #include <thread>
 
-#include "bench/commands.h"
 #include "bench/cluster.h"
+#include "bench/commands.h"
 #include "common/anticipation.h"
 #include "common/run_settings.h"
 #include "common/scene/scene_builder.h"

@@ -1,6 +1,7 @@
 // soda-bench scaling: strong and weak scaling of a city. Two cores say how one world compares with two; beyond that a
-// model of a cluster (cluster.h) runs the real protocol core of up to 1,024 worlds in virtual time, each piece of work at
-// what it costs here and each message at what it costs over DDS here. Whole sessions of real processes check the model.
+// model of a cluster (cluster.h) runs the real protocol core of up to 1,024 worlds in virtual time, each piece of work
+// at what it costs here and each message at what it costs over DDS here. Whole sessions of real processes check the
+// model.
 #include <algorithm>
 #include <bit>
 #include <cstdio>
@@ -34,36 +35,69 @@ struct Size {
   std::uint32_t bodies, bodies_per_world;  // of strong scaling, of weak scaling
   std::vector<WorldId> strong, weak;       // without those that both have
   Step steps;
+  WorldId common() const { return bodies / bodies_per_world; }
 };
-const Size kFull{64000, 1000, {1, 2, 4, 16, 64, 256, 1024}, {1, 4, 16}, 60};
+const Size kFull{64000, 1000, {1, 2, 4, 16, 64, 256, 1024}, {1, 4, 16}, 48};
 const Size kQuick{2000, 250, {1, 2, 4, 8}, {1, 2}, 20};
 
 // What a run of the model says; times are s per step and world.
 struct Outcome {
-  double step = 0;  // from one step to the next
+  double step = 0;                         // from one step to the next
   std::array<double, kActivities> mean{};  // by Activity
   double busy_mean = 0, busy_max = 0;
+  double pieces = 0;  // of work, per step and world
   double bodies_max_over_mean = 0;
   double messages = 0, bytes = 0;  // per step and world
   double mixed_islands = 0;        // per step, in all
   double redone = 0;               // share of all results
-  double sum_busy(WorldId worlds) const { return busy_mean * worlds; }
+  double alone = 1;                // a world's work without the others in its caches, over with them
 };
+
+using Factors = std::array<double, kActivities>;
+constexpr Factors kAlone{1, 1, 1, 1};
+constexpr WorldId kReplayed = 4;
 
 // A whole session of so many steps, from the scene to when the last of them is final everywhere. (Between two steps on
 // the way those who run ahead would have done more, or less, than what lies between.)
 class Run {
  public:
-  Run(const Scene& scene, WorldId worlds, const Mode& mode, const Network& network, Step steps)
+  Run(const Scene& scene, WorldId worlds, const Mode& mode, const Network& network, Step steps, const Factors& factors,
+      Yardstick& yardstick)
       : mode_(mode),
         latency_(network.latency),
         steps_(steps),
+        yardstick_(yardstick),
+        costs_(&yardstick),
         cluster_(scene, bisect(scene, make_grid(scene), worlds),
                  {.last_step = steps, .sync = mode.sync, .window = kWindow}, network, costs_),
         final_(worlds, 0),
         front_(worlds, 0) {
     cluster_.worked = [this](WorldId w) { worked(w); };
     if (mode.barrier) order_all(1);
+    costs_.factors = factors;
+  }
+
+  // What a world's work costs alone against what it costs here, where all share one processor's caches. By some worlds.
+  Factors factors() {
+    std::vector<WorldId> some;
+    for (WorldId i = 0; i < kReplayed; ++i)
+      if (const WorldId w = (2 * i + 1) * cluster_.worlds() / (2 * kReplayed); some.empty() || w != some.back())
+        some.push_back(w);
+    for (const WorldId w : some) cluster_.record(w);
+    cluster_.run();
+    Cluster::Usage together, alone;
+    for (const WorldId w : some) {
+      MeasuredCosts costs(&yardstick_);
+      const Cluster::Usage replayed = cluster_.replay(w, costs);
+      for (std::size_t a = 0; a < kActivities; ++a) {
+        together.seconds[a] += cluster_.usage(w).seconds[a];
+        alone.seconds[a] += replayed.seconds[a];
+      }
+    }
+    Factors factors;
+    for (std::size_t a = 0; a < kActivities; ++a)
+      factors[a] = together.seconds[a] > 0 ? alone.seconds[a] / together.seconds[a] : 1;
+    return factors;
   }
 
   Outcome outcome() {
@@ -77,6 +111,7 @@ class Run {
       const border::WorldCore& core = cluster_.core(w);
       const Cluster::Usage& usage = cluster_.usage(w);
       for (std::size_t a = 0; a < kActivities; ++a) o.mean[a] += usage.seconds[a] / steps / worlds;
+      o.pieces += static_cast<double>(usage.pieces) / steps / worlds;
       o.busy_mean += usage.busy() / steps / worlds;
       o.busy_max = std::max(o.busy_max, usage.busy() / steps);
       const auto own = static_cast<double>(core.own_bodies());
@@ -117,38 +152,67 @@ class Run {
   const Mode mode_;
   const double latency_;  // s
   const Step steps_;
+  Yardstick& yardstick_;
   MeasuredCosts costs_;
   Cluster cluster_;
   std::vector<Step> final_, front_;  // by world
   Step limit_ = 0;                   // of the barrier
 };
 
+// One scene on so many worlds.
+class Experiment {
+ public:
+  Experiment(const Scene& scene, WorldId worlds, Step steps, Yardstick& yardstick)
+      : scene_(scene), worlds_(worlds), steps_(steps), yardstick_(yardstick) {}
+
+  Outcome run(const Mode& mode, const Network& network) {
+    Outcome o = Run(scene_, worlds_, mode, network, steps_, factors(mode, network), yardstick_).outcome();
+    o.alone = factors(mode, network)[static_cast<std::size_t>(Activity::kWorking)];
+    return o;
+  }
+
+ private:
+  const Factors& factors(const Mode& mode, const Network& network) {
+    std::optional<Factors>& known = factors_[mode.sync == border::Sync::kAnticipative];
+    if (!known)
+      known =
+          worlds_ == 1
+              ? kAlone
+              : Run(scene_, worlds_, {mode.name, mode.sync, false}, network, steps_ / 3, kAlone, yardstick_).factors();
+    return *known;
+  }
+
+  const Scene& scene_;
+  const WorldId worlds_;
+  const Step steps_;
+  Yardstick& yardstick_;
+  std::optional<Factors> factors_[2];
+};
+
 class Tables {
  public:
   explicit Tables(const Options& options)
       : table_(options, "scaling",
-               "kind,mode,worlds,bodies,step_ms,speedup,efficiency,waiting_share,work_over_one_world,busy_max_over_mean,"
-               "step_over_busy_max,receiving_ms,working_ms,telling_ms,network_ms,bodies_max_over_mean,"
-               "messages_per_world_step,bytes_per_world_step,mixed_islands_per_step,latency_us") {}
+               "kind,mode,worlds,bodies,step_ms,speedup,efficiency,waiting_share,more_work,uneven,busiest_waits,"
+               "receiving_ms,working_ms,telling_ms,network_ms,pieces,redone_share,bodies_max_over_mean,messages,bytes,"
+               "mixed_islands,alone_over_together") {}
 
-  // `one`: the time of a step on one world, of all bodies (strong) or of as many as each has (weak).
-  void add(const char* kind, const Mode& mode, WorldId worlds, std::uint32_t bodies, const Outcome& o, double one,
-           const Network& network) {
-    const bool strong = kind != std::string("weak");
-    const double n = worlds, work_of_one = strong ? one : n * one;
+  // `one`: the time of a step on one world, of all bodies or, in weak scaling, of as many as each has; s.
+  void add(const std::string& kind, const Mode& mode, WorldId worlds, std::uint32_t bodies, const Outcome& o,
+           double one) {
+    const double n = worlds, work_of_one = kind == "weak" ? n * one : one;
     const double speedup = work_of_one / o.step, efficiency = speedup / n;
-    table_.row(kind, mode.name, worlds, bodies, 1e3 * o.step, speedup, efficiency, 1 - o.busy_mean / o.step,
-               o.sum_busy(worlds) / work_of_one, o.busy_max / o.busy_mean, o.step / o.busy_max, 1e3 * o.mean[0],
-               1e3 * o.mean[1], 1e3 * o.mean[2], 1e3 * o.mean[3], o.bodies_max_over_mean, o.messages, o.bytes,
-               o.mixed_islands, 1e6 * network.latency);
-    std::printf(
-        "%s %-12s %4u worlds of %5.0f bodies: %8.3f ms per step, %6.1f times one world, efficiency %.3f = 1 / (%.3f more "
-        "work x %.3f uneven x %.3f waiting of the busiest); waiting %.0f %%\n",
-        kind, mode.name, worlds, bodies / n, 1e3 * o.step, speedup, efficiency, o.sum_busy(worlds) / work_of_one,
-        o.busy_max / o.busy_mean, o.step / o.busy_max, 100 * (1 - o.busy_mean / o.step));
-    std::printf("   receiving %.2f working %.2f telling %.2f network %.2f ms; messages %.1f bytes %.0f mixed %.1f redone %.2f bodies max %.2f\n", 1e3 * o.mean[0],
-               1e3 * o.mean[1], 1e3 * o.mean[2], 1e3 * o.mean[3], o.messages, o.bytes,
-               o.mixed_islands, o.redone, o.bodies_max_over_mean);
+    const double more_work = o.busy_mean * n / work_of_one, uneven = o.busy_max / o.busy_mean;
+    const double waits = o.step / o.busy_max, waiting = 1 - o.busy_mean / o.step;
+    table_.row(kind, mode.name, worlds, bodies, 1e3 * o.step, speedup, efficiency, waiting, more_work, uneven, waits,
+               1e3 * o.mean[0], 1e3 * o.mean[1], 1e3 * o.mean[2], 1e3 * o.mean[3], o.pieces, o.redone,
+               o.bodies_max_over_mean, o.messages, o.bytes, o.mixed_islands, o.alone);
+    std::printf("%-20s %-12s %5u %7.3f ms %7.1f x  efficiency %.3f = 1 / (%.2f x %.2f x %.2f), waiting %2.0f %%\n",
+                kind.c_str(), mode.name, worlds, 1e3 * o.step, speedup, efficiency, more_work, uneven, waits,
+                100 * waiting);
+    std::printf("%39s %.2f receiving, %.2f working, %.2f telling, %.2f network; %.1f pieces of work, %.1f messages\n",
+                "ms per step and world:", 1e3 * o.mean[0], 1e3 * o.mean[1], 1e3 * o.mean[2], 1e3 * o.mean[3], o.pieces,
+                o.messages);
     std::fflush(stdout);
   }
   void close() { table_.close(); }
@@ -161,6 +225,97 @@ Scene city(std::uint32_t bodies) {
   Scene scene = generate("city", bodies, 1);
   scene.sleeping = false;  // else it soon costs nothing
   return scene;
+}
+
+// By number of worlds: what the model says of few of them, which real ones can be compared with.
+using Compared = std::vector<std::pair<WorldId, Outcome>>;
+// On as many worlds as weak scaling ends with: of the same bodies.
+using Common = std::vector<std::pair<Mode, Outcome>>;
+
+std::string key(const std::string& what, WorldId worlds, const Mode& mode) {
+  return what + "_" + std::to_string(worlds) +
+         (mode.sync == border::Sync::kAnticipative ? "" : std::string("_") + mode.name);
+}
+
+void strong(const Scene& scene, const Size& size, const Network& network, Yardstick& yardstick, Tables& tables,
+            Headline& headline, Compared& compared, Common& common) {
+  double one = 0;
+  for (const WorldId worlds : size.strong) {
+    Experiment experiment(scene, worlds, size.steps, yardstick);
+    for (const Mode& mode : kModes) {
+      if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;  // alone, all are the same
+      const Outcome o = experiment.run(mode, network);
+      if (worlds == 1) one = o.step;
+      const auto efficiency = [&](const Outcome& of) { return one / of.step / worlds; };
+      tables.add("strong", mode, worlds, size.bodies, o, one);
+      headline.add(key("city.efficiency", worlds, mode), efficiency(o));
+      headline.add(key("city.waiting_share", worlds, mode), 1 - o.busy_mean / o.step);
+      if (worlds <= 4 && mode.sync == border::Sync::kAnticipative) compared.emplace_back(worlds, o);
+      if (worlds != size.common()) continue;
+      common.emplace_back(mode, o);
+      headline.add(key("city.more_work", worlds, mode), o.busy_mean * worlds / one);
+      headline.add(key("city.uneven", worlds, mode), o.busy_max / o.busy_mean);
+      headline.add(key("city.busiest_waits", worlds, mode), o.step / o.busy_max);
+      // What the answer depends on: a slow network, and a second core that takes messages from DDS.
+      if (mode.barrier) continue;
+      Network slow = network, relieved = network;
+      slow.latency *= 10;
+      relieved.receive_seconds = relieved.receive_seconds_per_byte = 0;
+      const Outcome late = experiment.run(mode, slow), helped = experiment.run(mode, relieved);
+      tables.add("strong latency x 10", mode, worlds, size.bodies, late, one);
+      tables.add("strong second core", mode, worlds, size.bodies, helped, one);
+      headline.add(key("city.efficiency_latency_x10", worlds, mode), efficiency(late));
+      headline.add(key("city.efficiency_second_core", worlds, mode), efficiency(helped));
+    }
+  }
+}
+
+void weak(const Size& size, const Network& network, Yardstick& yardstick, Tables& tables, Headline& headline,
+          const Common& common) {
+  double one = 0;
+  for (const WorldId worlds : size.weak) {
+    const std::uint32_t bodies = worlds * size.bodies_per_world;
+    const Scene scene = city(bodies);
+    Experiment experiment(scene, worlds, size.steps, yardstick);
+    for (const Mode& mode : kModes) {
+      if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;
+      const Outcome o = experiment.run(mode, network);
+      if (worlds == 1) one = o.step;
+      tables.add("weak", mode, worlds, bodies, o, one);
+      headline.add(key("weak.efficiency", worlds, mode), one / o.step);
+    }
+  }
+  for (const auto& [mode, o] : common) {
+    tables.add("weak", mode, size.common(), size.bodies, o, one);
+    headline.add(key("weak.efficiency", size.common(), mode), one / o.step);
+  }
+}
+
+// The model against sessions of real processes, which share two cores and one memory.
+void check(const Scene& scene, const Size& size, const Options& options, Headline& headline, const Compared& compared) {
+  const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 2;
+  Csv table(options, "scaling_real", "worlds,real_step_ms,model_step_ms,real_cpu_ms,model_busy_ms");
+  const SessionRuns runs(scene);
+  const auto steps = static_cast<double>(size.steps);
+  std::vector<std::vector<double>> wall(compared.size()), cpu(compared.size());
+  for (int round = 0; round < rounds; ++round)
+    for (std::size_t i = 0; i < compared.size(); ++i) {
+      const SessionRun real = runs.run("--worlds " + std::to_string(compared[i].first) + " --no-shm", size.steps);
+      wall[i].push_back(real.wall / steps);
+      cpu[i].push_back(real.cpu / steps);
+    }
+  for (std::size_t i = 0; i < compared.size(); ++i) {
+    const auto& [worlds, o] = compared[i];
+    const double step = median(wall[i]), all_cpu = median(cpu[i]), busy = o.busy_mean * worlds;
+    table.row(worlds, 1e3 * step, 1e3 * o.step, 1e3 * all_cpu, 1e3 * busy);
+    std::printf("%u real worlds: %.1f ms per step (model %.1f), %.1f ms of CPU (model %.1f)\n", worlds, 1e3 * step,
+                1e3 * o.step, 1e3 * all_cpu, 1e3 * busy);
+    const std::string end = "_" + std::to_string(worlds);
+    // More worlds than there are cores say nothing of the time.
+    if (worlds <= 2) headline.add("model_over_real.step" + end, o.step / step);
+    headline.add("model_over_real.cpu" + end, busy / all_cpu);
+    if (worlds == 2) headline.add("city.real_efficiency_2", median(wall[0]) / step / 2);
+  }
 }
 
 constexpr const char* kPicture = R"(
@@ -195,84 +350,26 @@ unset multiplot
 
 void scaling(const Options& options, Headline& headline) {
   Size size = options.quick ? kQuick : kFull;
-  if (const char* dev = std::getenv("SCALING_DEV")) size.strong = {1, static_cast<WorldId>(std::atoi(dev))}, size.weak={1}, size.bodies = std::atoi(std::getenv("SCALING_BODIES"));
+  if (const char* dev = std::getenv("SCALING_DEV"))
+    size.strong = {1, static_cast<WorldId>(std::atoi(dev))}, size.weak = {1},
+    size.bodies = std::atoi(std::getenv("SCALING_BODIES"));
   Network network = measure_messages(options.quick);
   network.bytes_per_second = kGigabit;
   headline.add("latency_us", 1e6 * network.latency);
   headline.add("send_us", 1e6 * network.send_seconds);
   headline.add("receive_us", 1e6 * network.receive_seconds);
+  std::printf("efficiency = 1 / (more work than one world x busiest world over mean x what that one waits)\n");
 
+  Yardstick yardstick;
   Tables tables(options);
   const Scene whole = city(size.bodies);
-  // The same worlds with as many bodies each as in weak scaling are in both.
-  const WorldId common = size.bodies / size.bodies_per_world;
-  std::vector<std::pair<WorldId, Outcome>> compared;  // with real runs
-  std::vector<std::pair<Mode, Outcome>> common_outcomes;
-  double one = 0;
-  for (const WorldId worlds : size.strong)
-    for (const Mode& mode : kModes) {
-      if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;  // all the same
-      const Outcome o = Run(whole, worlds, mode, network, size.steps).outcome();
-      if (worlds == 1) one = o.step;
-      tables.add("strong", mode, worlds, size.bodies, o, one, network);
-      const std::string end = std::to_string(worlds) + (&mode == kModes ? "" : std::string("_") + mode.name);
-      headline.add("city.efficiency_" + end, one / o.step / worlds);
-      headline.add("city.waiting_share_" + end, 1 - o.busy_mean / o.step);
-      if (worlds <= 4 && &mode == kModes) compared.emplace_back(worlds, o);
-      if (worlds != common) continue;
-      common_outcomes.emplace_back(mode, o);
-      headline.add("city.more_work_" + end, o.sum_busy(worlds) / one);
-      headline.add("city.uneven_" + end, o.busy_max / o.busy_mean);
-      headline.add("city.busiest_waits_" + end, o.step / o.busy_max);
-      Network slow = network;
-      slow.latency *= 10;
-      const Outcome late = Run(whole, worlds, mode, slow, size.steps).outcome();
-      tables.add("strong, latency x 10", mode, worlds, size.bodies, late, one, slow);
-      headline.add("city.efficiency_" + end + "_latency_x10", one / late.step / worlds);
-    }
-
-  double one_of_weak = 0;
-  for (const WorldId worlds : size.weak) {
-    const std::uint32_t bodies = worlds * size.bodies_per_world;
-    const Scene scene = city(bodies);
-    for (const Mode& mode : kModes) {
-      if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;
-      const Outcome o = Run(scene, worlds, mode, network, size.steps).outcome();
-      if (worlds == 1) one_of_weak = o.step;
-      tables.add("weak", mode, worlds, bodies, o, one_of_weak, network);
-      if (worlds == size.weak.back()) headline.add(std::string("weak.efficiency_") + std::to_string(worlds) + "_" + mode.name, one_of_weak / o.step);
-    }
-  }
-  for (const auto& [mode, o] : common_outcomes) {
-    tables.add("weak", mode, common, size.bodies, o, one_of_weak, network);
-    headline.add("weak.efficiency_" + std::to_string(common) + "_" + mode.name, one_of_weak / o.step);
-  }
+  Compared compared;
+  Common common;
+  strong(whole, size, network, yardstick, tables, headline, compared, common);
+  weak(size, network, yardstick, tables, headline, common);
   tables.close();
-
-  const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 3;
-  Csv real_table(options, "scaling_real", "worlds,real_step_ms,model_step_ms,real_cpu_ms,model_busy_ms");
-  const SessionRuns runs(whole);
-  std::vector<std::vector<double>> wall(compared.size()), cpu(compared.size());
-  for (int round = 0; round < rounds; ++round)
-    for (std::size_t i = 0; i < compared.size(); ++i) {
-      const SessionRun real =
-          runs.run("--worlds " + std::to_string(compared[i].first) + " --no-shm", size.steps);
-      wall[i].push_back(real.wall / static_cast<double>(size.steps));
-      cpu[i].push_back(real.cpu / static_cast<double>(size.steps));
-    }
-  for (std::size_t i = 0; i < compared.size(); ++i) {
-    const auto& [worlds, o] = compared[i];
-    const double busy = o.sum_busy(worlds);
-    real_table.row(worlds, 1e3 * median(wall[i]), 1e3 * o.step, 1e3 * median(cpu[i]), 1e3 * busy);
-    std::printf("%u real worlds: %.1f ms per step (model %.1f), %.1f ms of CPU (model %.1f)\n", worlds,
-                1e3 * median(wall[i]), 1e3 * o.step, 1e3 * median(cpu[i]), 1e3 * busy);
-    const std::string end = "_" + std::to_string(worlds);
-    // More worlds than the cores at hand say nothing of the time.
-    if (worlds <= 2) headline.add("model_over_real.step" + end, o.step / median(wall[i]));
-    headline.add("model_over_real.cpu" + end, busy / median(cpu[i]));
-  }
-  real_table.close();
   plot(options, "scaling", kPicture, 1000, 440);
+  check(whole, size, options, headline, compared);
 }
 
 }  // namespace soda::bench
