@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <span>
@@ -25,6 +26,7 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t kSizes[] = {128, 2048, 16384, 65536};  // bytes: an empty message, and what borders send
 constexpr std::size_t kFarewell = 1;
+constexpr int kRounds = 7;
 constexpr int kBurst = 8;  // messages at once: a world tells its neighbours what it has computed
 
 struct End {
@@ -119,12 +121,18 @@ Network measure_messages(bool quick) {
     End end(session, 0);
     for (int i = 0; i < 2000 && !end.transport.connected(); ++i) std::this_thread::sleep_for(10ms);
     if (!end.transport.connected()) throw std::runtime_error("two processes on this machine do not meet over DDS");
-    const int bursts = quick ? 50 : 500;
+    const int bursts = quick ? 20 : 200;
     (void)measure(end, kSizes[0], 1, bursts);  // until both are warm
+    // Of several rounds the best: on a machine that others use, too, all else is theirs.
     for (const std::size_t bytes : kSizes) {
-      Sample sample = measure(end, bytes, kBurst, bursts);
-      sample.one_way = measure(end, bytes, 1, bursts).one_way;
-      samples.push_back(sample);
+      Sample best{static_cast<double>(bytes), HUGE_VAL, HUGE_VAL, HUGE_VAL};
+      for (int round = 0; round < kRounds; ++round) {
+        const Sample alone = measure(end, bytes, 1, bursts), many = measure(end, bytes, kBurst, bursts);
+        best.one_way = std::min(best.one_way, alone.one_way);
+        best.send = std::min(best.send, many.send);
+        best.receive = std::min(best.receive, many.receive);
+      }
+      samples.push_back(best);
     }
     end.transport.send(1, std::vector<std::byte>(kFarewell));
     end.transport.flush(5s);

@@ -37,7 +37,7 @@ struct Size {
   Step steps;
   WorldId common() const { return bodies / bodies_per_world; }
 };
-const Size kFull{64000, 1000, {1, 2, 4, 16, 64, 256, 1024}, {1, 4, 16}, 48};
+const Size kFull{64000, 1000, {1, 2, 4, 16, 64, 256, 1024}, {1, 4, 16}, 32};
 const Size kQuick{2000, 250, {1, 2, 4, 8}, {1, 2}, 20};
 
 // What a run of the model says; times are s per step and world.
@@ -349,10 +349,7 @@ unset multiplot
 }  // namespace
 
 void scaling(const Options& options, Headline& headline) {
-  Size size = options.quick ? kQuick : kFull;
-  if (const char* dev = std::getenv("SCALING_DEV"))
-    size.strong = {1, static_cast<WorldId>(std::atoi(dev))}, size.weak = {1},
-    size.bodies = std::atoi(std::getenv("SCALING_BODIES"));
+  const Size& size = options.quick ? kQuick : kFull;
   Network network = measure_messages(options.quick);
   network.bytes_per_second = kGigabit;
   headline.add("latency_us", 1e6 * network.latency);
