@@ -1,10 +1,13 @@
 #include "bench/cluster.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <stdexcept>
 #include <utility>
 
 #include "bench/clocks.h"
+#include "bench/harness.h"
 #include "common/scene/generators.h"
 
 namespace soda::bench {
@@ -29,17 +32,35 @@ double Yardstick::slowness() {
   return some[1] / at_first_;
 }
 
-void MeasuredCosts::begin(const border::WorldCore&) {
+void MeasuredCosts::begin(const border::WorldCore& core) {
   constexpr double kEvery = 0.2;  // s of CPU time: others begin and end all the time
+  bodies_ = core.stats().timeline.bodies_computed;
+  clock_ = core.clock();
   since_ = cpu_seconds();
   if (!yardstick_ || since_ < known_at_ + kEvery) return;
   slowness_ = yardstick_->slowness();
   known_at_ = since_ = cpu_seconds();
 }
 
-double MeasuredCosts::spent(WorldId, const border::WorldCore&, Activity activity, double) {
+double MeasuredCosts::spent(WorldId world, const border::WorldCore& core, Activity activity, double) {
   const double now = cpu_seconds();
-  return factors[static_cast<std::size_t>(activity)] / slowness_ * (now - std::exchange(since_, now));
+  double seconds = (now - since_) / slowness_;
+  if (activity == Activity::kWorking) seconds = clipped(world, core, seconds);
+  since_ = cpu_seconds();
+  return factors[static_cast<std::size_t>(activity)] * seconds;
+}
+
+double MeasuredCosts::clipped(WorldId world, const border::WorldCore& core, double seconds) {
+  constexpr std::uint64_t kLarge = 32;        // bodies
+  constexpr std::size_t kFew = 3, kMost = 9;  // pieces of work that say what is usual
+  const std::uint64_t bodies = core.stats().timeline.bodies_computed - bodies_;
+  const bool step = core.clock() > clock_;  // its islands have been found
+  if (!step && bodies < kLarge) return seconds;
+  std::vector<double>& like = like_[{world, step, static_cast<std::uint32_t>(std::bit_width(bodies))}];
+  const double most = like.size() >= kFew ? 2 * median(like) : seconds;
+  if (like.size() >= kMost) like.erase(like.begin());
+  like.push_back(seconds);
+  return std::min(seconds, most);
 }
 
 Cluster::Cluster(const Scene& scene, const TerritoryMap& map, const border::CoreSettings& settings,
