@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <ctime>
 #include <span>
@@ -99,10 +100,7 @@ void fit(double Sample::*cost, const Sample& small, const Sample& large, double&
   at_zero = small.*cost - per_byte * small.bytes;
 }
 
-}  // namespace
-
-Network measure_messages(bool quick) {
-  const std::string session = "soda-bench-" + std::to_string(getpid());
+Network measure_once(const std::string& session, bool quick) {
   std::fflush(stdout);
   const pid_t other = fork();
   if (other < 0) throw std::runtime_error("cannot start a process");
@@ -116,6 +114,13 @@ Network measure_messages(bool quick) {
     }
     _exit(status);
   }
+  const struct Ends {
+    pid_t process;
+    ~Ends() {
+      kill(process, SIGTERM);
+      waitpid(process, nullptr, 0);
+    }
+  } ends{other};
   std::vector<Sample> samples;
   {
     End end(session, 0);
@@ -136,7 +141,6 @@ Network measure_messages(bool quick) {
     }
     end.transport.send(1, std::vector<std::byte>(kFarewell));
     end.transport.flush(5s);
-    waitpid(other, nullptr, 0);
   }
   for (const Sample& s : samples)
     std::printf(
@@ -147,6 +151,19 @@ Network measure_messages(bool quick) {
   fit(&Sample::send, samples.front(), samples.back(), network.send_seconds, network.send_seconds_per_byte);
   fit(&Sample::receive, samples.front(), samples.back(), network.receive_seconds, network.receive_seconds_per_byte);
   return network;
+}
+
+}  // namespace
+
+Network measure_messages(bool quick) {
+  constexpr int kAttempts = 3;  // one that is given too little time to acknowledge may lose messages
+  const std::string session = "soda-bench-" + std::to_string(getpid()) + "-";
+  for (int attempt = 1;; ++attempt) try {
+      return measure_once(session + std::to_string(attempt), quick);
+    } catch (const std::runtime_error& error) {
+      if (attempt == kAttempts) throw;
+      std::printf("%s; once more\n", error.what());
+    }
 }
 
 }  // namespace soda::bench
