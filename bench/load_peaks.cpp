@@ -4,11 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <functional>
-#include <optional>
-#include <queue>
-#include <stdexcept>
 
+#include "bench/cluster.h"
 #include "bench/lone_core.h"
 #include "common/run_settings.h"
 #include "common/scene/generators.h"
@@ -58,149 +55,101 @@ struct Pacing {
   Step steps = 0;  // to be displayed, or to be made final
 };
 
+// What a world's work costs on its machine: so much for each body computed.
+class PeakCosts final : public Costs {
+ public:
+  explicit PeakCosts(double per_body) : per_body_(per_body) {}
+  void begin(const border::WorldCore& core) override {
+    bodies_ = bodies_computed(core);
+    clock_ = core.clock();
+  }
+  double spent(WorldId world, const border::WorldCore& core, Activity activity, double now) override {
+    if (activity != Activity::kWorking) return 0;
+    // A new step's first half: in between, messages come and go. (Repairs are small enough to be one piece.)
+    const double half = core.clock() > clock_ ? kFindingShare * static_cast<double>(core.own_bodies()) : 0;
+    const double bodies = static_cast<double>(bodies_computed(core) - bodies_);
+    const double due = half > 0 ? half : bodies - std::min(bodies, paid_[world]);
+    if (half > 0)
+      paid_[world] = half;
+    else if (bodies > 0)
+      paid_[world] = 0;
+    return due * per_body_ * slowness(world, now);
+  }
+
+ private:
+  const double per_body_;
+  std::uint64_t bodies_ = 0;  // computed before
+  Step clock_ = 0;
+  std::array<double, 2> paid_{};  // bodies, of the step that is only begun
+};
+
 class VirtualSession {
  public:
   VirtualSession(const Scene& scene, border::Sync sync, const Pacing& pacing, double cost)
-      : pacing_(pacing), cost_(cost) {
-    const TerritoryMap map = bisect(scene, make_grid(scene), 2);
-    for (WorldId w = 0; w < 2; ++w) {
-      worlds_[w].core.emplace(scene, map,
-                              border::CoreSettings{.me = w,
-                                                   .last_step = pacing.paced ? kFar : pacing.steps,
-                                                   .sync = sync,
-                                                   .window = kWindow,
-                                                   .actions = true});
-      order(w, pacing.paced ? Order{kWindow, pacing.lead} : Order{kFar, kFar});
-      at(0, [this, w] { look(w); });
-    }
-    if (pacing.paced) at(kStart, [this] { frame(); });
+      : pacing_(pacing),
+        costs_(cost),
+        cluster_(scene, bisect(scene, make_grid(scene), 2),
+                 {.last_step = pacing.paced ? kFar : pacing.steps, .sync = sync, .window = kWindow, .actions = true},
+                 {.latency = kMessage}, costs_) {
+    for (WorldId w = 0; w < 2; ++w)
+      cluster_.order(w, pacing.paced ? Cluster::Order{kWindow, pacing.lead} : Cluster::Order{kFar, kFar});
+    cluster_.worked = [this](WorldId w) { told(w); };
+    if (pacing.paced) cluster_.at(kStart, [this] { frame(); });
   }
 
   // Until the last frame, or step. Returns the virtual time that it took, s.
   double run() {
-    while (!events_.empty() && !ended_) {
-      const Event event = events_.top();
-      events_.pop();
-      now_ = event.time;
-      event.happens();
-    }
-    if (!ended_) throw std::runtime_error("the session stands still");
-    return now_;
+    cluster_.run();
+    return cluster_.now();
   }
 
   const std::vector<Frame>& frames() const { return frames_; }
-  double redone_share() {
-    return static_cast<double>(bodies_redone(core(0)) + bodies_redone(core(1))) /
-           static_cast<double>(bodies_computed(core(0)) + bodies_computed(core(1)));
+  double redone_share() const {
+    return static_cast<double>(bodies_redone(cluster_.core(0)) + bodies_redone(cluster_.core(1))) /
+           static_cast<double>(bodies_computed(cluster_.core(0)) + bodies_computed(cluster_.core(1)));
   }
-  double mixed_per_step() {
-    return static_cast<double>(core(0).stats().mixed_islands) / static_cast<double>(core(0).final_step());
+  double mixed_per_step() const {
+    const border::WorldCore& core = cluster_.core(0);
+    return static_cast<double>(core.stats().mixed_islands) / static_cast<double>(core.final_step());
   }
 
  private:
-  struct Event {
-    double time;
-    std::uint64_t number;  // what was planned first happens first
-    std::function<void()> happens;
-    bool operator<(const Event& o) const { return time != o.time ? time > o.time : number > o.number; }
-  };
-  struct Order {
-    Step limit, closed;
-  };
-  struct World {
-    std::optional<LoneCore> core;
-    std::vector<std::vector<std::byte>> inbox;  // what came while it was busy
-    std::optional<Order> order;                 // likewise
-    bool busy = false;
-    double paid = 0;      // bodies, of the step that is only begun
-    Step told_final = 0;  // that the display knows of
-  };
-
-  void at(double time, std::function<void()> happens) { events_.push({time, ++number_, std::move(happens)}); }
-  border::WorldCore& core(WorldId w) { return **worlds_[w].core; }
-  void order(WorldId w, const Order& order) { worlds_[w].order = order; }
-
-  // A world that is not busy takes what has come, and does what it can.
-  void look(WorldId w) {
-    World& world = worlds_[w];
-    if (world.busy) return;
-    if (world.order) {
-      core(w).set_limit(world.order->limit);
-      core(w).close_actions(world.order->closed, 0);
-      world.order.reset();
-    }
-    for (const auto& bytes : world.inbox)
-      if (!core(w).receive(bytes)) throw std::runtime_error(core(w).last_refusal());
-    world.inbox.clear();
-    for (;;) {
-      const std::uint64_t before = bodies_computed(core(w));
-      const Step clock = core(w).clock();
-      const bool worked = core(w).work() == border::Progress::kWorked;
-      // A new step's first half: in between, messages come and go. (Repairs are small enough to be one piece.)
-      const double half = core(w).clock() > clock ? kFindingShare * static_cast<double>(core(w).own_bodies()) : 0;
-      const double bodies = static_cast<double>(bodies_computed(core(w)) - before);
-      const double took = (half > 0 ? half : bodies - std::min(bodies, world.paid)) * cost_ * slowness(w, now_);
-      if (half > 0)
-        world.paid = half;
-      else if (bodies > 0)
-        world.paid = 0;
-      if (took > 0) {  // what has come of it is known afterwards
-        world.busy = true;
-        at(now_ + took, [this, w] {
-          worlds_[w].busy = false;
-          tell(w);
-          look(w);
-        });
-        return;
-      }
-      tell(w);
-      if (!worked) return;
-    }
-  }
-
-  void tell(WorldId w) {
-    for (border::Outgoing& out : core(w).take_outgoing())
-      at(now_ + kMessage, [this, to = out.to, bytes = std::move(out.bytes)] {
-        worlds_[to].inbox.push_back(bytes);
-        look(to);
-      });
-    const Step final_step = core(w).final_step();
+  void told(WorldId w) {
+    const Step final_step = cluster_.core(w).final_step();
     if (pacing_.paced)
-      at(now_ + kMessage, [this, w, final_step] { worlds_[w].told_final = final_step; });
-    else if (std::min(core(0).final_step(), core(1).final_step()) == pacing_.steps)
-      ended_ = true;
+      cluster_.at(cluster_.now() + kMessage, [this, w, final_step] { told_final_[w] = final_step; });
+    else if (std::min(cluster_.core(0).final_step(), cluster_.core(1).final_step()) == pacing_.steps)
+      cluster_.stop();
   }
 
   // A frame is due: the next step is displayed if it is final, else the last one once more, and all is that much later
   // from then on, as the Pacer of a session does it.
   void frame() {
-    const Step final_step = std::min(worlds_[0].told_final, worlds_[1].told_final);
+    const double now = cluster_.now();
+    const Step final_step = std::min(told_final_[0], told_final_[1]);
     if (final_step > displayed_)
       ++displayed_;
     else
       ++missed_;
-    frames_.push_back({now_ - kStart, displayed_, final_step, {core(0).clock(), core(1).clock()}, missed_});
+    frames_.push_back(
+        {now - kStart, displayed_, final_step, {cluster_.core(0).clock(), cluster_.core(1).clock()}, missed_});
     for (WorldId w = 0; w < 2; ++w)
-      at(now_ + kMessage, [this, w, next = Order{displayed_ + kWindow, displayed_ + pacing_.lead}] {
-        order(w, next);
-        look(w);
+      cluster_.at(now + kMessage, [this, w, next = Cluster::Order{displayed_ + kWindow, displayed_ + pacing_.lead}] {
+        cluster_.order(w, next);
       });
     if (static_cast<Step>(frames_.size()) == pacing_.steps)
-      ended_ = true;
+      cluster_.stop();
     else
-      at(kStart + static_cast<double>(frames_.size()) / kRate, [this] { frame(); });
+      cluster_.at(kStart + static_cast<double>(frames_.size()) / kRate, [this] { frame(); });
   }
 
   const Pacing pacing_;
-  const double cost_;
-  std::array<World, 2> worlds_;
-  std::priority_queue<Event> events_;
-  std::uint64_t number_ = 0;
-  double now_ = 0;
+  PeakCosts costs_;
+  Cluster cluster_;
+  std::array<Step, 2> told_final_{};  // that the display knows of
   Step displayed_ = 0;
   int missed_ = 0;
   std::vector<Frame> frames_;
-  bool ended_ = false;
 };
 
 // What a body and step cost here: s, median over steps.

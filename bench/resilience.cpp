@@ -4,10 +4,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <thread>
 
+#include "bench/cluster.h"
 #include "bench/commands.h"
-#include "bench/lone_core.h"
 #include "common/anticipation.h"
 #include "common/run_settings.h"
 #include "common/scene/scene_builder.h"
@@ -66,44 +67,41 @@ struct Lasted {
   double cost = 0;  // s per step, mean
 };
 
+// So much for each step, however many bodies there are: known when it is begun.
+class StepCosts final : public Costs {
+ public:
+  double per_step = 0;  // s
+  void begin(const border::WorldCore& core) override { clock_ = core.clock(); }
+  double spent(WorldId, const border::WorldCore& core, Activity activity, double) override {
+    return activity == Activity::kWorking && core.clock() > clock_ ? per_step : 0;
+  }
+
+ private:
+  Step clock_ = 0;
+};
+
 // A core of one world with a full window, whose steps cost so much from then on. Time is virtual.
 Step lasts_in_core(double cost) {
   SceneBuilder builder("anything");
   builder.add(Box{Vec3(1, 1, 1)}, Vec3::Zero());
-  LoneCore core(builder.finish(), kMostSteps + 2 * kEntries);
+  const Scene scene = builder.finish();
+  StepCosts costs;
+  Cluster cluster(scene, bisect(scene, make_grid(scene), 1),
+                  {.last_step = kMostSteps + 2 * kEntries, .window = kEntries, .actions = true}, {}, costs);
+  Step there = 0;  // the newest step that is paid for
+  cluster.worked = [&](WorldId) { there = std::min(cluster.core(0).clock(), cluster.core(0).front()); };
   Step shown = 0;
-  double busy_until = 0;
-  const auto order = [&] {
-    core->set_limit(shown + kEntries);
-    core->close_actions(shown + kDefaultLead, 0);
-    (void)core->take_outgoing();  // lets go of what is final
-  };
-  // All that can be done by `time`; a step that is begun is there when it is paid for.
-  Step there = 0;
-  const auto work_until = [&](double time, double step_cost) {
-    for (;;) {
-      if (core->clock() > there) {
-        if (busy_until > time) return;
-        there = core->clock();
-      }
-      const Step clock = core->clock();
-      if (core->work() != border::Progress::kWorked) {
-        busy_until = std::max(busy_until, time);
-        return;
-      }
-      if (core->clock() > clock) busy_until += step_cost;
-    }
-  };
-  order();
-  work_until(0, 0);  // the warm-up
-  busy_until = 0;
-  for (Step frame = 1; frame <= kMostSteps; ++frame) {
-    work_until(static_cast<double>(frame) / kRate, cost);
-    if (std::min(there, core->front()) <= shown) return shown;
-    ++shown;
+  const auto order = [&] { cluster.order(0, {shown + kEntries, shown + kDefaultLead}); };
+  std::function<void()> frame = [&] {
+    if (there <= shown || ++shown == kMostSteps) return cluster.stop();
     order();
-  }
-  return kMostSteps;
+    cluster.at(static_cast<double>(shown + 1) / kRate, frame);
+  };
+  order();  // the window is filled at time 0, for nothing
+  cluster.at(0.5 / kRate, [&] { costs.per_step = cost; });
+  cluster.at(1 / kRate, frame);
+  cluster.run();
+  return shown;
 }
 
 Lasted lasts_in_real_time(std::uint32_t bodies, Step most) {

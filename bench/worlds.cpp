@@ -1,19 +1,11 @@
 // `soda-bench worlds`: the same scene on one world and on two, as whole runs of `soda run` over DDS, and on one world
 // without network. Rounds are interleaved; the median of each is compared.
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <cstdio>
-#include <cstdlib>
-#include <fstream>
 #include <map>
-#include <regex>
-#include <sstream>
-#include <stdexcept>
 
 #include "bench/commands.h"
+#include "bench/session_runs.h"
 #include "common/scene/generators.h"
-#include "common/scene/scene_file.h"
 
 namespace soda::bench {
 namespace {
@@ -36,21 +28,6 @@ struct Case {
 };
 constexpr Case kCases[] = {{"piles", 1728, 600}, {"city", 8000, 240}};
 
-double number_in(const std::filesystem::path& json, const std::string& key) {
-  std::stringstream text;
-  text << std::ifstream(json).rdbuf();
-  const std::string content = text.str();
-  std::smatch match;
-  if (!std::regex_search(content, match, std::regex("\"" + key + "\": *([-+.0-9e]+)")))
-    throw std::runtime_error("no " + key + " in the statistics of soda run");
-  return std::stod(match[1]);
-}
-
-void run(const std::string& command) {
-  const int status = std::system(command.c_str());
-  if (status != 0) throw std::runtime_error("this failed: " + command);
-}
-
 constexpr const char* kPicture = R"(
 set key top left
 set style data boxes
@@ -68,29 +45,23 @@ plot 'worlds.csv' skip 1 using 0:5:xtic(stringcolumn(1)."\n".stringcolumn(2)) lc
 
 void worlds(const Options& options, Headline& headline) {
   const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 5;
-  const auto folder = std::filesystem::temp_directory_path() / ("soda-bench-" + std::to_string(getpid()));
-  std::filesystem::create_directories(folder);
-  const auto scene_file = folder / "bench.scene", stats = folder / "stats.json";
   Csv table(options, "worlds",
             "scene,run,steps_per_second,cpu_seconds,over_one_world,waiting_share,mixed_islands_per_step");
   for (const Case& c : kCases) {
     Scene scene = generate(c.scene, c.bodies, 1);
     scene.sleeping = false;  // else the scenes soon cost nothing
-    save_scene(scene, scene_file);
+    const SessionRuns runs(scene);
     const int steps = options.quick ? c.steps / 6 : c.steps;
     std::map<std::string, std::vector<double>> speed, cpu, waiting, mixed;
     for (int round = 0; round < rounds; ++round)
       for (const Run& r : kRuns) {
         std::printf("\r%s: round %d of %d, %-14s", c.scene, round + 1, rounds, r.name);
         std::fflush(stdout);
-        run("'" + soda_program().string() + "' run '" + scene_file.string() + "' " + r.arguments + " --steps " +
-            std::to_string(steps) + " --pace max --quiet --stats '" + stats.string() + "' > '" +
-            (folder / "output").string() + "' 2>&1");
-        const double wall = number_in(stats, "wall_seconds");
-        speed[r.name].push_back(steps / wall);
-        cpu[r.name].push_back(number_in(stats, "cpu_seconds"));
-        waiting[r.name].push_back(number_in(stats, "waiting_seconds") / wall);
-        mixed[r.name].push_back(number_in(stats, "mixed_islands") / steps);
+        const SessionRun result = runs.run(r.arguments, steps);
+        speed[r.name].push_back(steps / result.wall);
+        cpu[r.name].push_back(result.cpu);
+        waiting[r.name].push_back(result.waiting / result.wall);
+        mixed[r.name].push_back(result.mixed_islands / steps);
       }
     const double one = median(speed["1"]);
     for (const Run& r : kRuns)
@@ -109,7 +80,6 @@ void worlds(const Options& options, Headline& headline) {
         c.scene, c.bodies, steps, median(speed["2"]) / one, median(speed["2 cons."]) / one,
         median(cpu["2"]) / median(cpu["1"]));
   }
-  std::filesystem::remove_all(folder);
   table.close();
   plot(options, "worlds", kPicture);
 }

@@ -1,0 +1,443 @@
+// soda-bench scaling: strong and weak scaling of a city. Two cores say how one world compares with two; beyond that a
+// model of a cluster (cluster.h) runs the real protocol core of up to 1,024 worlds in virtual time, each piece of work
+// at what it costs here and each message at what it costs over DDS here. Whole sessions of real processes check the
+// model.
+#include <malloc.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "bench/cluster.h"
+#include "bench/commands.h"
+#include "bench/lone_core.h"
+#include "bench/message_costs.h"
+#include "bench/session_runs.h"
+#include "common/scene/generators.h"
+
+namespace soda::bench {
+namespace {
+
+constexpr double kGigabit = 125e6;  // bytes/s
+
+struct Mode {
+  const char* name;
+  border::Sync sync;
+  bool barrier;  // nobody begins a step before everybody has done the one before
+};
+constexpr Mode kAnticipative{"anticipative", border::Sync::kAnticipative, false},
+    kConservative{"conservative", border::Sync::kConservative, false},
+    kBarrier{"barrier", border::Sync::kConservative, true};
+constexpr Mode kModes[] = {kAnticipative, kConservative, kBarrier};
+
+struct Size {
+  std::uint32_t bodies, bodies_per_world;  // of strong scaling, of weak scaling
+  std::vector<WorldId> strong, weak;       // without those that both have
+  Step steps;
+  WorldId common() const { return bodies / bodies_per_world; }
+};
+const Size kFull{64000, 1000, {1, 2, 4, 16, 64, 256, 1024}, {1, 4, 16}, 32};
+const Size kQuick{2000, 250, {1, 2, 4, 8}, {1, 2}, 20};
+
+// Memory that a process has had before costs less than what the kernel must find and clear, as does that of a session
+// that has run for a while: so that all runs find it alike, so much, bytes, is taken and given back to the heap alone.
+void warm_heap(std::size_t bytes) {
+  mallopt(M_TRIM_THRESHOLD, -1);  // never
+  mallopt(M_TOP_PAD, 64 << 20);
+  mallopt(M_MMAP_MAX, 0);
+  constexpr std::size_t kPiece = std::size_t{1} << 16;
+  std::vector<std::unique_ptr<char[]>> pieces;
+  for (std::size_t i = 0; i < bytes / kPiece; ++i) {
+    pieces.emplace_back(new char[kPiece]);
+    std::memset(pieces.back().get(), 1, kPiece);
+  }
+}
+
+// What a run of the model says; times are s per step and world.
+struct Outcome {
+  double step = 0;                         // from one step to the next
+  std::array<double, kActivities> mean{};  // by Activity
+  double busy_mean = 0, busy_max = 0;
+  double pieces = 0;  // of work, per step and world
+  double bodies_max_over_mean = 0;
+  double messages = 0, bytes = 0;  // per step and world
+  double mixed_islands = 0;        // per step, in all
+  double redone = 0;               // share of all results
+  double alone = 1;                // a world's work without the others in its caches, over with them
+};
+
+using Factors = std::array<double, kActivities>;
+constexpr Factors kAlone{1, 1, 1, 1};
+constexpr WorldId kReplayed = 4;
+
+// A whole session of so many steps, from the scene to when the last of them is final everywhere. (Between two steps on
+// the way those who run ahead would have done more, or less, than what lies between.)
+class Run {
+ public:
+  Run(const Scene& scene, WorldId worlds, const Mode& mode, const Network& network, Step steps, const Factors& factors,
+      Yardstick& yardstick)
+      : mode_(mode),
+        latency_(network.latency),
+        steps_(steps),
+        yardstick_(yardstick),
+        costs_(&yardstick),
+        cluster_(scene, bisect(scene, make_grid(scene), worlds),
+                 {.last_step = steps, .sync = mode.sync, .window = kWindow}, network, costs_),
+        final_(worlds, 0),
+        front_(worlds, 0) {
+    cluster_.worked = [this](WorldId w) { worked(w); };
+    if (mode.barrier) order_all(1);
+    costs_.factors = factors;
+  }
+
+  // What a world's work costs alone against what it costs here, where all share one processor's caches. By some worlds.
+  Factors factors() {
+    std::vector<WorldId> some;
+    for (WorldId i = 0; i < kReplayed; ++i)
+      if (const WorldId w = (2 * i + 1) * cluster_.worlds() / (2 * kReplayed); some.empty() || w != some.back())
+        some.push_back(w);
+    for (const WorldId w : some) cluster_.record(w);
+    cluster_.run();
+    Cluster::Usage together, alone;
+    for (const WorldId w : some) {
+      MeasuredCosts costs(&yardstick_);
+      const Cluster::Usage replayed = cluster_.replay(w, costs);
+      for (std::size_t a = 0; a < kActivities; ++a) {
+        together.seconds[a] += cluster_.usage(w).seconds[a];
+        alone.seconds[a] += replayed.seconds[a];
+      }
+    }
+    Factors factors;
+    for (std::size_t a = 0; a < kActivities; ++a)
+      factors[a] = together.seconds[a] > 0 ? alone.seconds[a] / together.seconds[a] : 1;
+    return factors;
+  }
+
+  Outcome outcome() {
+    cluster_.run();
+    Outcome o;
+    const auto steps = static_cast<double>(steps_);
+    const double worlds = cluster_.worlds();
+    o.step = cluster_.now() / steps;
+    double bodies_max = 0, bodies = 0, redone = 0, computed = 0;
+    for (WorldId w = 0; w < cluster_.worlds(); ++w) {
+      const border::WorldCore& core = cluster_.core(w);
+      const Cluster::Usage& usage = cluster_.usage(w);
+      for (std::size_t a = 0; a < kActivities; ++a) o.mean[a] += usage.seconds[a] / steps / worlds;
+      o.pieces += static_cast<double>(usage.pieces) / steps / worlds;
+      o.busy_mean += usage.busy() / steps / worlds;
+      o.busy_max = std::max(o.busy_max, usage.busy() / steps);
+      const auto own = static_cast<double>(core.own_bodies());
+      bodies += own;
+      bodies_max = std::max(bodies_max, own);
+      o.messages += static_cast<double>(core.stats().messages_sent) / steps / worlds;
+      o.bytes += static_cast<double>(core.stats().bytes_sent) / steps / worlds;
+      o.mixed_islands += static_cast<double>(core.stats().mixed_islands) / steps;
+      redone += static_cast<double>(bodies_redone(core));
+      computed += static_cast<double>(bodies_computed(core));
+    }
+    o.bodies_max_over_mean = bodies_max / (bodies / worlds);
+    o.redone = redone / computed;
+    return o;
+  }
+
+ private:
+  void worked(WorldId w) {
+    if (mode_.barrier && pass(front_, w, cluster_.core(w).front(), limit_)) {
+      // Word of it goes up a binary tree of all worlds, and down again.
+      const int levels = static_cast<int>(std::bit_width(cluster_.worlds() - 1u));
+      cluster_.at(cluster_.now() + 2 * levels * latency_, [this, next = limit_ + 1] { order_all(next); });
+    }
+    if (pass(final_, w, cluster_.core(w).final_step(), steps_)) cluster_.stop();
+  }
+
+  // Notes how far a world has got; whether all have now got to `goal`, and had not before.
+  static bool pass(std::vector<Step>& reached, WorldId w, Step step, Step goal) {
+    const bool before = std::exchange(reached[w], step) >= goal;
+    return !before && step >= goal && *std::min_element(reached.begin(), reached.end()) >= goal;
+  }
+
+  void order_all(Step limit) {
+    limit_ = limit;
+    for (WorldId w = 0; w < cluster_.worlds(); ++w) cluster_.order(w, {limit, limit});
+  }
+
+  const Mode mode_;
+  const double latency_;  // s
+  const Step steps_;
+  Yardstick& yardstick_;
+  MeasuredCosts costs_;
+  Cluster cluster_;
+  std::vector<Step> final_, front_;  // by world
+  Step limit_ = 0;                   // of the barrier
+};
+
+// What `f` returns, computed in a process of its own: so each run finds the same heap, in which no other has left its
+// memory in pieces.
+template <typename F>
+auto apart(F&& f) {
+  using Result = decltype(f());
+  static_assert(std::is_trivially_copyable_v<Result>);
+  int ends[2];
+  if (pipe(ends) != 0) throw std::runtime_error("cannot make a pipe");
+  std::fflush(stdout);
+  const pid_t child = fork();
+  if (child < 0) throw std::runtime_error("cannot start a process");
+  if (child == 0) {
+    int status = 1;
+    try {
+      const Result result = f();
+      status = write(ends[1], &result, sizeof result) == static_cast<ssize_t>(sizeof result) ? 0 : 1;
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "soda-bench: %s\n", error.what());
+    }
+    _exit(status);
+  }
+  close(ends[1]);
+  Result result;
+  const bool got = read(ends[0], &result, sizeof result) == static_cast<ssize_t>(sizeof result);
+  close(ends[0]);
+  waitpid(child, nullptr, 0);
+  if (!got) throw std::runtime_error("a run of the model has failed");
+  return result;
+}
+
+// One scene on so many worlds.
+class Experiment {
+ public:
+  Experiment(const Scene& scene, WorldId worlds, Step steps, int rounds, Yardstick& yardstick)
+      : scene_(scene), worlds_(worlds), steps_(steps), rounds_(rounds), yardstick_(yardstick) {}
+
+  // The least busy of the rounds: others on the machine only add to what is measured.
+  Outcome run(const Mode& mode, const Network& network) {
+    const Factors factors = this->factors(mode, network);
+    Outcome best;
+    for (int round = 0; round < rounds_; ++round) {
+      Outcome o = apart([&] {
+        warm_heap(heap());
+        return Run(scene_, worlds_, mode, network, steps_, factors, yardstick_).outcome();
+      });
+      o.alone = factors[static_cast<std::size_t>(Activity::kWorking)];
+      if (round == 0 || o.busy_mean < best.busy_mean) best = o;
+    }
+    return best;
+  }
+
+ private:
+  Factors factors(const Mode& mode, const Network& network) {
+    std::optional<Factors>& known = factors_[mode.sync == border::Sync::kAnticipative];
+    if (worlds_ == 1) return kAlone;
+    if (!known)
+      known = apart([&] {
+        warm_heap(heap());
+        return Run(scene_, worlds_, {mode.name, mode.sync, false}, network, steps_ / 3, kAlone, yardstick_).factors();
+      });
+    return *known;
+  }
+  // Bytes: records of a body at all steps of a window, and a start for each world.
+  std::size_t heap() const { return scene_.bodies.size() * 40'000 + worlds_ * (std::size_t{2} << 20); }
+
+  const Scene& scene_;
+  const WorldId worlds_;
+  const Step steps_;
+  const int rounds_;
+  Yardstick& yardstick_;
+  std::optional<Factors> factors_[2];
+};
+
+class Tables {
+ public:
+  explicit Tables(const Options& options)
+      : table_(options, "scaling",
+               "kind,mode,worlds,bodies,step_ms,speedup,efficiency,waiting_share,more_work,uneven,busiest_waits,"
+               "receiving_ms,working_ms,telling_ms,network_ms,pieces,redone_share,bodies_max_over_mean,messages,bytes,"
+               "mixed_islands,alone_over_together") {}
+
+  // `one`: the time of a step on one world, of all bodies or, in weak scaling, of as many as each has; s.
+  void add(const std::string& kind, const Mode& mode, WorldId worlds, std::uint32_t bodies, const Outcome& o,
+           double one) {
+    const double n = worlds, work_of_one = kind == "weak" ? n * one : one;
+    const double speedup = work_of_one / o.step, efficiency = speedup / n;
+    const double more_work = o.busy_mean * n / work_of_one, uneven = o.busy_max / o.busy_mean;
+    const double waits = o.step / o.busy_max, waiting = 1 - o.busy_mean / o.step;
+    table_.row(kind, mode.name, worlds, bodies, 1e3 * o.step, speedup, efficiency, waiting, more_work, uneven, waits,
+               1e3 * o.mean[0], 1e3 * o.mean[1], 1e3 * o.mean[2], 1e3 * o.mean[3], o.pieces, o.redone,
+               o.bodies_max_over_mean, o.messages, o.bytes, o.mixed_islands, o.alone);
+    std::printf("%-20s %-12s %5u %7.3f ms %7.1f x  efficiency %.3f = 1 / (%.2f x %.2f x %.2f), waiting %2.0f %%\n",
+                kind.c_str(), mode.name, worlds, 1e3 * o.step, speedup, efficiency, more_work, uneven, waits,
+                100 * waiting);
+    std::printf("%39s %.2f receiving, %.2f working, %.2f telling, %.2f network; %.1f pieces of work, %.1f messages\n",
+                "ms per step and world:", 1e3 * o.mean[0], 1e3 * o.mean[1], 1e3 * o.mean[2], 1e3 * o.mean[3], o.pieces,
+                o.messages);
+    std::fflush(stdout);
+  }
+  void close() { table_.close(); }
+
+ private:
+  Csv table_;
+};
+
+Scene city(std::uint32_t bodies) {
+  Scene scene = generate("city", bodies, 1);
+  scene.sleeping = false;  // else it soon costs nothing
+  return scene;
+}
+
+// By number of worlds: what the model says of few of them, which real ones can be compared with.
+using Compared = std::vector<std::pair<WorldId, Outcome>>;
+// On as many worlds as weak scaling ends with: of the same bodies.
+using Common = std::vector<std::pair<Mode, Outcome>>;
+
+std::string key(const std::string& what, WorldId worlds, const Mode& mode) {
+  return what + "_" + std::to_string(worlds) +
+         (mode.sync == border::Sync::kAnticipative ? "" : std::string("_") + mode.name);
+}
+
+void strong(const Scene& scene, const Size& size, const Network& network, int rounds, Yardstick& yardstick,
+            Tables& tables, Headline& headline, Compared& compared, Common& common) {
+  double one = 0;
+  for (const WorldId worlds : size.strong) {
+    Experiment experiment(scene, worlds, size.steps, rounds, yardstick);
+    for (const Mode& mode : kModes) {
+      if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;  // alone, all are the same
+      const Outcome o = experiment.run(mode, network);
+      if (worlds == 1) one = o.step;
+      const auto efficiency = [&](const Outcome& of) { return one / of.step / worlds; };
+      tables.add("strong", mode, worlds, size.bodies, o, one);
+      headline.add(key("city.efficiency", worlds, mode), efficiency(o));
+      headline.add(key("city.waiting_share", worlds, mode), 1 - o.busy_mean / o.step);
+      if (worlds <= 4 && mode.sync == border::Sync::kAnticipative) compared.emplace_back(worlds, o);
+      if (worlds != size.common()) continue;
+      common.emplace_back(mode, o);
+      headline.add(key("city.more_work", worlds, mode), o.busy_mean * worlds / one);
+      headline.add(key("city.uneven", worlds, mode), o.busy_max / o.busy_mean);
+      headline.add(key("city.busiest_waits", worlds, mode), o.step / o.busy_max);
+      // What the answer depends on: a slow network, and a second core that takes messages from DDS.
+      if (mode.barrier) continue;
+      Network slow = network, relieved = network;
+      slow.latency *= 10;
+      relieved.receive_seconds = relieved.receive_seconds_per_byte = 0;
+      const Outcome late = experiment.run(mode, slow), helped = experiment.run(mode, relieved);
+      tables.add("strong latency x 10", mode, worlds, size.bodies, late, one);
+      tables.add("strong second core", mode, worlds, size.bodies, helped, one);
+      headline.add(key("city.efficiency_latency_x10", worlds, mode), efficiency(late));
+      headline.add(key("city.efficiency_second_core", worlds, mode), efficiency(helped));
+    }
+  }
+}
+
+void weak(const Size& size, const Network& network, int rounds, Yardstick& yardstick, Tables& tables,
+          Headline& headline, const Common& common) {
+  double one = 0;
+  for (const WorldId worlds : size.weak) {
+    const std::uint32_t bodies = worlds * size.bodies_per_world;
+    const Scene scene = city(bodies);
+    Experiment experiment(scene, worlds, size.steps, rounds, yardstick);
+    for (const Mode& mode : kModes) {
+      if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;
+      const Outcome o = experiment.run(mode, network);
+      if (worlds == 1) one = o.step;
+      tables.add("weak", mode, worlds, bodies, o, one);
+      headline.add(key("weak.efficiency", worlds, mode), one / o.step);
+    }
+  }
+  for (const auto& [mode, o] : common) {
+    tables.add("weak", mode, size.common(), size.bodies, o, one);
+    headline.add(key("weak.efficiency", size.common(), mode), one / o.step);
+  }
+}
+
+// The model against sessions of real processes, which share two cores and one memory. A step takes what a long session
+// takes more than a short one, so that start and first memory do not count.
+void check(const Scene& scene, const Size& size, const Options& options, Headline& headline, const Compared& compared) {
+  const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 3;
+  Csv table(options, "scaling_real", "worlds,real_step_ms,model_step_ms,real_cpu_ms,model_busy_ms");
+  const SessionRuns runs(scene);
+  const auto steps = static_cast<double>(size.steps);
+  std::vector<std::vector<double>> wall(compared.size()), cpu(compared.size());
+  for (int round = 0; round < rounds; ++round)
+    for (std::size_t i = 0; i < compared.size(); ++i) {
+      const std::string arguments = "--worlds " + std::to_string(compared[i].first) + " --no-shm";
+      const SessionRun less = runs.run(arguments, size.steps), more = runs.run(arguments, 2 * size.steps);
+      wall[i].push_back((more.wall - less.wall) / steps);
+      cpu[i].push_back((more.cpu - less.cpu) / steps);
+    }
+  for (std::size_t i = 0; i < compared.size(); ++i) {
+    const auto& [worlds, o] = compared[i];
+    const double step = median(wall[i]), all_cpu = median(cpu[i]), busy = o.busy_mean * worlds;
+    table.row(worlds, 1e3 * step, 1e3 * o.step, 1e3 * all_cpu, 1e3 * busy);
+    std::printf("%u real worlds: %.1f ms per step (model %.1f), %.1f ms of CPU (model %.1f)\n", worlds, 1e3 * step,
+                1e3 * o.step, 1e3 * all_cpu, 1e3 * busy);
+    const std::string end = "_" + std::to_string(worlds);
+    // More worlds than there are cores say nothing of the time.
+    if (worlds <= 2) headline.add("model_over_real.step" + end, o.step / step);
+    headline.add("model_over_real.cpu" + end, busy / all_cpu);
+    if (worlds == 2) headline.add("city.real_efficiency_2", median(wall[0]) / step / 2);
+  }
+}
+
+constexpr const char* kPicture = R"(
+set datafile missing NaN  # so that lines go on across other modes' rows
+set multiplot layout 1,2
+set grid
+set logscale x 2
+set xlabel 'worlds'
+of(kind, mode, column_) = stringcolumn(1) eq kind && stringcolumn(2) eq mode ? column(column_) : NaN
+set logscale y 2
+set key top left
+set ylabel 'times as fast as one world'
+set title 'A city on a cluster (model): strong scaling'
+plot x with lines dt 2 lc rgb '#909090' title 'ideal', \
+  'scaling.csv' skip 1 using 3:(of('strong', 'anticipative', 6)) with linespoints lw 2 pt 7 lc rgb '#d1603d' title 'anticipative', \
+  '' skip 1 using 3:(of('strong', 'conservative', 6)) with linespoints lw 2 pt 5 lc rgb '#3d7ea6' title 'conservative', \
+  '' skip 1 using 3:(of('strong', 'barrier', 6)) with linespoints lw 2 pt 9 lc rgb '#6a994e' title 'a barrier in each step'
+unset logscale y
+set yrange [0:*]
+set key bottom left
+set ylabel 'efficiency'
+set title 'strong (lines) and weak (points)'
+plot 'scaling.csv' skip 1 using 3:(of('strong', 'anticipative', 7)) with lines lw 2 lc rgb '#d1603d' title 'anticipative', \
+  '' skip 1 using 3:(of('strong', 'conservative', 7)) with lines lw 2 lc rgb '#3d7ea6' title 'conservative', \
+  '' skip 1 using 3:(of('strong', 'barrier', 7)) with lines lw 2 lc rgb '#6a994e' title 'a barrier in each step', \
+  '' skip 1 using 3:(of('weak', 'anticipative', 7)) with points pt 7 lc rgb '#d1603d' notitle, \
+  '' skip 1 using 3:(of('weak', 'conservative', 7)) with points pt 5 lc rgb '#3d7ea6' notitle, \
+  '' skip 1 using 3:(of('weak', 'barrier', 7)) with points pt 9 lc rgb '#6a994e' notitle
+unset multiplot
+)";
+
+}  // namespace
+
+void scaling(const Options& options, Headline& headline) {
+  const Size& size = options.quick ? kQuick : kFull;
+  Network network = measure_messages(options.quick);
+  network.bytes_per_second = kGigabit;
+  headline.add("latency_us", 1e6 * network.latency);
+  headline.add("send_us", 1e6 * network.send_seconds);
+  headline.add("receive_us", 1e6 * network.receive_seconds);
+  std::printf("efficiency = 1 / (more work than one world x busiest world over mean x what that one waits)\n");
+
+  const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 2;
+  Yardstick yardstick;
+  Tables tables(options);
+  const Scene whole = city(size.bodies);
+  Compared compared;
+  Common common;
+  strong(whole, size, network, rounds, yardstick, tables, headline, compared, common);
+  weak(size, network, rounds, yardstick, tables, headline, common);
+  tables.close();
+  plot(options, "scaling", kPicture, 1000, 440);
+  check(whole, size, options, headline, compared);
+}
+
+}  // namespace soda::bench
