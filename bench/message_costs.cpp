@@ -7,7 +7,9 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <ctime>
 #include <span>
 #include <stdexcept>
@@ -41,9 +43,9 @@ struct End {
     network.shared_memory = false;  // the machines of a cluster have none in common
     return network;
   }
-  // The next message; none where nothing comes for long.
-  std::optional<std::vector<std::byte>> next() {
-    const auto until = Clock::now() + 20s;
+  // The next message; none where nothing comes for so long.
+  std::optional<std::vector<std::byte>> next(Clock::duration at_most) {
+    const auto until = Clock::now() + at_most;
     while (Clock::now() < until) {
       if (auto incoming = transport.receive()) {
         if (incoming->kind == world::Incoming::Kind::kMessage) return std::move(incoming->bytes);
@@ -60,7 +62,7 @@ struct End {
 // Sends everything back.
 void echo(const std::string& session) {
   End end(session, 1);
-  while (auto bytes = end.next()) {
+  while (auto bytes = end.next(20s)) {
     if (bytes->size() == kFarewell) break;
     end.transport.send(0, std::move(*bytes));
   }
@@ -76,20 +78,36 @@ struct Sample {
   double bytes, one_way, send, receive;  // s
 };
 
-// `burst` messages at once, to the other process and back; again and again.
+// `burst` messages at once, to the other process and back; again and again. A burst of which something is missing does
+// not count: who is kept from acknowledging for long is sent no more for a while, and what was to be sent is dropped.
 Sample measure(End& end, std::size_t bytes, int burst, int bursts) {
   std::vector<double> round_trips, sending, receiving;
-  for (int i = 0; i < bursts; ++i) {
+  static std::uint32_t number = 0;  // of the burst, in its messages
+  for (int missed = 0; std::ssize(round_trips) < bursts;) {
+    ++number;
     const double before = process_seconds(), send_begun = cpu_seconds();
     const auto sent_at = Clock::now();
-    for (int k = 0; k < burst; ++k) end.transport.send(1, std::vector<std::byte>(bytes));
-    sending.push_back(cpu_seconds() - send_begun);
-    for (int k = 0; k < burst; ++k)
-      if (const auto back = end.next(); !back || back->size() != bytes)
-        throw std::runtime_error("messages to another process on this machine get lost");
+    for (int k = 0; k < burst; ++k) {
+      std::vector<std::byte> message(bytes);
+      std::memcpy(message.data(), &number, sizeof number);
+      end.transport.send(1, std::move(message));
+    }
+    const double sent = cpu_seconds() - send_begun;
+    int back = 0;
+    while (back < burst) {
+      const auto message = end.next(1s);
+      if (!message) break;
+      back += std::memcmp(message->data(), &number, sizeof number) == 0;
+    }
+    if (back < burst) {
+      constexpr int kMissedAtMost = 20;
+      if (++missed > kMissedAtMost) throw std::runtime_error("messages to another process on this machine get lost");
+      continue;
+    }
+    sending.push_back(sent);
     round_trips.push_back(std::chrono::duration<double>(Clock::now() - sent_at).count());
     // What is not sending is receiving, on whichever thread.
-    receiving.push_back(process_seconds() - before - sending.back());
+    receiving.push_back(process_seconds() - before - sent);
   }
   return {static_cast<double>(bytes), median(round_trips) / 2, median(sending) / burst, median(receiving) / burst};
 }
@@ -100,7 +118,10 @@ void fit(double Sample::*cost, const Sample& small, const Sample& large, double&
   at_zero = small.*cost - per_byte * small.bytes;
 }
 
-Network measure_once(const std::string& session, bool quick) {
+}  // namespace
+
+Network measure_messages(bool quick) {
+  const std::string session = "soda-bench-" + std::to_string(getpid());
   std::fflush(stdout);
   const pid_t other = fork();
   if (other < 0) throw std::runtime_error("cannot start a process");
@@ -151,19 +172,6 @@ Network measure_once(const std::string& session, bool quick) {
   fit(&Sample::send, samples.front(), samples.back(), network.send_seconds, network.send_seconds_per_byte);
   fit(&Sample::receive, samples.front(), samples.back(), network.receive_seconds, network.receive_seconds_per_byte);
   return network;
-}
-
-}  // namespace
-
-Network measure_messages(bool quick) {
-  constexpr int kAttempts = 3;  // one that is given too little time to acknowledge may lose messages
-  const std::string session = "soda-bench-" + std::to_string(getpid()) + "-";
-  for (int attempt = 1;; ++attempt) try {
-      return measure_once(session + std::to_string(attempt), quick);
-    } catch (const std::runtime_error& error) {
-      if (attempt == kAttempts) throw;
-      std::printf("%s; once more\n", error.what());
-    }
 }
 
 }  // namespace soda::bench
