@@ -66,7 +66,12 @@ double MeasuredCosts::clipped(WorldId world, const border::WorldCore& core, doub
 Cluster::Cluster(const Scene& scene, const TerritoryMap& map, const border::CoreSettings& settings,
                  const Network& network, Costs& costs)
     : settings_(settings), network_(network), costs_(costs), model_(scene), map_(map), worlds_(map.worlds) {
-  for (WorldId w = 0; w < worlds(); ++w) worlds_[w].core = make_core(w);
+  for (WorldId w = 0; w < worlds(); ++w) {
+    worlds_[w].core = make_core(w);
+    if (settings.balance)
+      worlds_[w].balancer =
+          std::make_unique<balance::Balancer>(*worlds_[w].core, map_.grid, w, scene.dt, settings.window);
+  }
 }
 
 std::unique_ptr<border::WorldCore> Cluster::make_core(WorldId w) {
@@ -98,7 +103,8 @@ void Cluster::run() {
   }
 }
 
-Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, const Piece& piece, Costs& costs, Usage& usage) const {
+Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, balance::Balancer* balancer, const Piece& piece,
+                            Costs& costs, Usage& usage) const {
   Done done{};
   const auto spend = [&](Activity activity, double seconds) {
     usage.seconds[static_cast<std::size_t>(activity)] += seconds;
@@ -118,6 +124,10 @@ Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, const Piece& pie
   measure(Activity::kReceiving);
   done.worked = core.work() == border::Progress::kWorked;
   measure(Activity::kWorking);
+  if (balancer) {
+    balancer->worked(done.seconds);
+    balancer->consider(pace);
+  }
   done.out = core.take_outgoing();
   measure(Activity::kTelling);
   for (const border::Outgoing& message : done.out)
@@ -130,7 +140,7 @@ Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, const Piece& pie
 Cluster::Usage Cluster::replay(WorldId w, Costs& costs) {
   const auto core = make_core(w);
   Usage usage;
-  for (const Piece& piece : worlds_[w].pieces) (void)work(w, *core, piece, costs, usage);
+  for (const Piece& piece : worlds_[w].pieces) (void)work(w, *core, nullptr, piece, costs, usage);
   return usage;
 }
 
@@ -140,7 +150,7 @@ void Cluster::look(WorldId w) {
   bool more = true;
   while (more && !world.busy && !stopped_) {
     Piece piece = std::exchange(world.next, {});
-    Done done = work(w, *world.core, piece, costs_, world.usage);
+    Done done = work(w, *world.core, world.balancer.get(), piece, costs_, world.usage);
     if (world.recorded) world.pieces.push_back(std::move(piece));
     more = done.worked;
     if (!(done.seconds > 0)) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/territory.h"
+#include "server/balance/balancer.h"
 #include "server/border/world_core.h"
 #include "server/physics/model.h"
 #include "server/physics/stepper.h"
@@ -94,6 +95,8 @@ class Cluster {
   Cluster(const Scene& scene, const TerritoryMap& map, const border::CoreSettings& settings, const Network& network,
           Costs& costs);
 
+  // How fast the session is shown: for worlds that balance their loads (settings.balance). Such cannot be replayed.
+  balance::Pace pace;
   // Called when a world has done something, what it says has left it, and it is not busy.
   std::function<void(WorldId)> worked;
 
@@ -127,6 +130,7 @@ class Cluster {
   };
   struct World {
     std::unique_ptr<border::WorldCore> core;
+    std::unique_ptr<balance::Balancer> balancer;
     Piece next;  // what came while it was busy
     bool busy = false, recorded = false;
     std::vector<Piece> pieces;
@@ -139,7 +143,8 @@ class Cluster {
     std::vector<border::Outgoing> out;
   };
   std::unique_ptr<border::WorldCore> make_core(WorldId w);
-  Done work(WorldId w, border::WorldCore& core, const Piece& piece, Costs& costs, Usage& usage) const;
+  Done work(WorldId w, border::WorldCore& core, balance::Balancer* balancer, const Piece& piece, Costs& costs,
+            Usage& usage) const;
   void look(WorldId w);
   void hand_over(WorldId w, std::vector<border::Outgoing> out);
 

@@ -9,13 +9,10 @@ namespace soda::balance {
 namespace {
 
 // What a body costs, against one that lies awake without contacts.
-constexpr double kPerContact = 0.5, kAsleep = 0.02;
-constexpr double kNewest = 0.5;   // weight of the newest measurement in the mean
-constexpr int kMostRefusals = 3;  // in a row, before the next measurement
-
-double weight(const timeline::Record& record) {
-  return record.body.asleep() ? kAsleep : 1 + kPerContact * static_cast<double>(record.contacts().size());
-}
+constexpr double kPerContact = 0.5, kStill = 0.02;
+constexpr double kNewest = 0.5;  // weight of the newest measurement in the mean
+constexpr double kLate = 2;      // frames by which a world falls behind before it looks at its load
+constexpr int kMostOffers = 4;   // one after the other, before the next measurement
 
 }  // namespace
 
@@ -33,8 +30,15 @@ Balancer::Balancer(border::WorldCore& core, const Grid& grid, WorldId me, double
 
 void Balancer::consider(const Pace& pace) {
   answer_offers();
-  hear_answer();
-  const bool due = core_.clock() >= measured_at_ + kEvery;
+  const bool again = hear_answer(pace);
+  // Sooner where it falls behind: every step counts then.
+  const Step now = core_.clock();
+  if (now > seen_) {
+    const double steps = static_cast<double>(now - std::exchange(seen_, now));
+    late_ = std::max(0.0, late_ + (since_ - std::exchange(seen_since_, since_)) - steps * pace.budget);
+  }
+  const bool late = pace.budget > 0 && late_ > kLate * pace.budget;
+  const bool due = now >= measured_at_ + kEvery || (late && now > measured_at_);
   if (due) {
     measure(pace);
     for (const WorldId neighbour : core_.neighbours()) {
@@ -43,20 +47,25 @@ void Balancer::consider(const Pace& pace) {
       told.coming = leaving == leaving_.end() ? 0 : leaving->second;
       core_.tell_load(neighbour, told);
     }
-    refusals_ = 0;
+    offers_ = 0;
   }
-  if ((due || (refusals_ > 0 && refusals_ < kMostRefusals)) && !proposed_) offer(pace);
+  if ((due || (again && offers_ < kMostOffers)) && !proposed_) offer(pace);
 }
 
 // What a step costs, in the mean, and what it will cost.
 void Balancer::measure(const Pace& pace) {
   const Step now = core_.clock();
-  const double work = since_ / static_cast<double>(now - measured_at_);
-  load_.work = measured_at_ == 0 ? work : (1 - kNewest) * load_.work + kNewest * work;
-  since_ = 0;
+  // By the body, so that it holds at once for what has been given or taken since.
+  const std::uint64_t before = std::exchange(computed_, core_.stats().timeline.bodies_computed);
+  if (computed_ > before) {
+    const double each = since_ / static_cast<double>(computed_ - before);
+    const bool urgent = pace.budget > 0 && each > per_body_;  // who is late must not wait for a mean
+    per_body_ = urgent || per_body_ == 0 ? each : (1 - kNewest) * per_body_ + kNewest * each;
+  }
+  since_ = seen_since_ = late_ = 0;
   measured_at_ = now;
   const std::vector<WorldId> owners = core_.owners_ahead();
-  spread_cost(now, owners);
+  spread_cost(owners);
   load_.expected = 0;
   for (const std::uint32_t cell : costly_)
     if (owners[cell] == me_) load_.expected += cost_[cell];
@@ -70,18 +79,21 @@ void Balancer::measure(const Pace& pace) {
 }
 
 // Over the cells where bodies will be, by their present speed; those who will be in others' cells count there.
-void Balancer::spread_cost(Step now, const std::vector<WorldId>& owners) {
+void Balancer::spread_cost(const std::vector<WorldId>& owners) {
   for (const std::uint32_t cell : costly_) cost_[cell] = 0;
   costly_.clear();
   leaving_.clear();
-  double all = 0;
-  core_.states(now).for_each([&](timeline::Slot, const Ref<timeline::Record>& held) {
+  const Step seen = core_.front();  // all of it is computed
+  double all = 0, moving = 0;
+  core_.states(seen).for_each([&](timeline::Slot, const Ref<timeline::Record>& held) {
     const timeline::Record& record = *held;
     if (record.place.owner != me_) return;
     const Vec3 x = record.body.x();
     const auto cell = static_cast<std::uint32_t>(grid_.index(grid_.cell_of(x + foresight_ * record.body.v())));
-    const double share = weight(record);
+    const bool moves = record.computed == seen;
+    const double share = moves ? 1 + kPerContact * static_cast<double>(record.contacts().size()) : kStill;
     all += share;
+    moving += moves;
     if (owners[cell] != me_ && !core_.has_cell(cell)) {
       leaving_[owners[cell]] += share;
       return;
@@ -89,6 +101,7 @@ void Balancer::spread_cost(Step now, const std::vector<WorldId>& owners) {
     if (cost_[cell] == 0) costly_.push_back(cell);
     cost_[cell] += share;
   });
+  load_.work = per_body_ * moving;
   if (all == 0) return;
   for (const std::uint32_t cell : costly_) cost_[cell] *= load_.work / all;
   for (auto& [world, share] : leaving_) share *= load_.work / all;
@@ -108,14 +121,16 @@ void Balancer::answer_offers() {
   }
 }
 
-void Balancer::hear_answer() {
-  if (!proposed_ || core_.offering()) return;
+// Whether to look at once for more to give: somebody else may take what was declined, and where time is short, one
+// neighbour may not be enough.
+bool Balancer::hear_answer(const Pace& pace) {
+  if (!proposed_ || core_.offering()) return false;
   const std::uint64_t before = std::exchange(declined_, core_.stats().offers_declined);
   const bool accepted = declined_ == before;
   policy_.answered(core_.clock(), *proposed_, accepted);
   if (accepted) load_.expected -= std::min(load_.expected, proposed_->cost);
-  refusals_ = accepted ? 0 : refusals_ + 1;
   proposed_.reset();
+  return !accepted || (pace.budget > 0 && load_.expected > pace.budget);
 }
 
 void Balancer::offer(const Pace& pace) {
@@ -137,10 +152,9 @@ void Balancer::offer(const Pace& pace) {
                             .budget = pace.budget,
                             .neighbours = neighbours_};
   std::optional<Proposal> proposal = policy_.propose(situation);
-  if (proposal && core_.give(proposal->taker, proposal->cells, proposal->cost))
-    proposed_ = std::move(proposal);
-  else
-    refusals_ = 0;
+  if (!proposal || !core_.give(proposal->taker, proposal->cells, proposal->cost)) return;
+  proposed_ = std::move(proposal);
+  ++offers_;
 }
 
 }  // namespace soda::balance

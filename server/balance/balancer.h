@@ -28,7 +28,7 @@ class Balancer {
   // Work of the world, s of CPU time, since the last call.
   void worked(double seconds) { since_ += seconds; }
   // To be called after each piece of work, before what goes out is taken: answers offers at once; looks at loads every
-  // kEvery steps of the clock.
+  // kEvery steps of the clock, and sooner while it falls behind the display.
   void consider(const Pace& pace);
 
   const Load& load() const { return load_; }
@@ -37,9 +37,9 @@ class Balancer {
 
  private:
   void measure(const Pace& pace);
-  void spread_cost(Step now, const std::vector<WorldId>& owners);
+  void spread_cost(const std::vector<WorldId>& owners);
   void answer_offers();
-  void hear_answer();
+  bool hear_answer(const Pace& pace);
   void offer(const Pace& pace);
 
   border::WorldCore& core_;
@@ -48,7 +48,11 @@ class Balancer {
   const double foresight_;  // s, until a transfer agreed on now has been in effect for half as long as until the next
   Policy policy_;
   double since_ = 0;  // s of work since the last measurement
-  Step measured_at_ = 0;
+  Step measured_at_ = 0, seen_ = 0;
+  double seen_since_ = 0;       // of since_, up to the step seen_
+  double late_ = 0;             // s by which steps have lately taken longer than they may
+  std::uint64_t computed_ = 0;  // bodies, at the last measurement
+  double per_body_ = 0;         // s of work for each body computed, a recent mean
   Load load_;
   std::vector<double> cost_;           // by cell: s per step that each of this world's will cost
   std::vector<std::uint32_t> costly_;  // cells that have any
@@ -56,7 +60,7 @@ class Balancer {
   std::vector<std::uint32_t> mine_;
   std::vector<Neighbour> neighbours_;
   std::optional<Proposal> proposed_;
-  int refusals_ = 0;            // in a row, of one measurement
+  int offers_ = 0;              // since the last measurement
   std::uint64_t declined_ = 0;  // of its offers, by the core's count
   struct Promise {
     std::vector<std::uint32_t> cells;

@@ -51,6 +51,9 @@ std::optional<Proposal> Policy::propose(const Situation& s) {
       return k != kept_.end() && k->cell == cell && k->from == n.world;
     };
     request.wanted = settings_.share * difference;
+    // Who still has time is given no more than it has time for: another neighbour may have some, too.
+    const double room = settings_.budget_part * s.budget - n.load.expected;
+    if (room > 0) request.wanted = std::min(request.wanted, room);
     request.limit = 0.5 * difference;
     request.max_cells = settings_.max_cells;
     // Cells that cost more cannot go; if little is left without them, there is no sense in giving what costs nothing.

@@ -46,6 +46,7 @@ struct Settings {
   double dead_band = 1 / 1.1;
   // Of the difference of two loads, what is given: half of it would make them equal, were they known exactly.
   double share = 0.45;
+  double budget_part = 0.9;   // of the budget, to which a taker that is below it is filled at most
   double least_part = 0.02;   // of the giver's load: a transfer that carries less is not worth its messages
   double least_cost = 10e-6;  // s per step, likewise
   // Steps until a transfer has taken effect: the window, and what agreeing on it takes. A world that will be on time

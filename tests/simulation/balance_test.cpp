@@ -29,7 +29,8 @@ Scene crowd(std::uint32_t walkers) {
   for (const double x : {-32.0, 32.0})
     for (const double y : {-32.0, 32.0}) builder.add(person, Vec3(x, y, 0));
   for (int i = 0; i < 15; ++i)
-    for (int j = 0; j < 15; ++j) builder.add(person, Vec3(4 * i - 28 + random.between(-1, 1), 4 * j - 28, 0));
+    for (int j = 0; j < 15; ++j)
+      builder.add(person, Vec3(4 * i - 28 + random.between(-1, 1), 4 * j - 28, 0)).angular_velocity = Vec3(0, 0, 1);
   const double radius = 0.7 * std::sqrt(walkers / 3.14);
   for (std::uint32_t i = 0; i < walkers; ++i) {
     const double angle = 2.399963 * i, r = radius * std::sqrt((i + 0.5) / walkers);  // as in a sunflower
