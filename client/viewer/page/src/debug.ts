@@ -73,7 +73,7 @@ export function expose(picture: Picture, session: Session, requests: Requests, r
         rollbacks: Number(state.rollbacks),
         ...session.rows[world],
       })),
-    cells: () => picture.grid.cells(session.welcome?.worlds ?? 0),
+    cells: () => picture.cells(),
     mayAct: () => session.mayAct,
   };
 }

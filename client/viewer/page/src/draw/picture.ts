@@ -31,7 +31,7 @@ export class Picture {
   readonly colours: BodyColours;
   playback: Playback | null = null;
   readonly statics: Statics;
-  grid = new Grid(undefined);
+  private grid = new Grid(undefined);
   private worlds = 0;
   private ownersDrawn = false; // as they are at the step that is shown
   private territory: Territory;
@@ -162,6 +162,12 @@ export class Picture {
     return [box.left + (0.5 + 0.5 * at.x) * box.width, box.top + (0.5 - 0.5 * at.y) * box.height];
   }
 
+  // How many cells each world owns at the step that is shown.
+  cells(): number[] {
+    this.passTransfers();
+    return this.grid.cells(this.worlds);
+  }
+
   // ---- what Playback tells ----
 
   appeared(body: number): void {
@@ -183,9 +189,13 @@ export class Picture {
       if (this.bodies.flags[body]! & FrameFlag.FLAG_REDONE) this.instances.flash(body, now);
   }
 
+  private passTransfers(): void {
+    if (this.grid.goTo(this.playback?.step() ?? 0)) this.ownersDrawn = false;
+  }
+
   // Borders are made anew only where some are to be seen, and only once the step has passed a transfer of cells.
   private drawOwners(): void {
-    if (this.grid.goTo(this.playback?.step() ?? 0)) this.ownersDrawn = false;
+    this.passTransfers();
     if (this.ownersDrawn || !this.settings.now.borders) return;
     this.ownersDrawn = true;
     this.statics.paint(this.grid);
