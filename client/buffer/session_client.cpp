@@ -54,7 +54,10 @@ SessionClient::SessionClient(const dds::NetworkOptions& network, const std::stri
   hear<wire::Status>(dds::status_topic());
   hear<wire::LogEntry>(dds::action_log_topic());
   hear<wire::Answer>(dds::answer_topic());
-  if (following_.transforms) hear<wire::Transforms>(dds::transforms_topic());
+  if (following_.transforms) {
+    hear<wire::Transforms>(dds::transforms_topic());
+    hear<wire::Transfer>(dds::transfers_topic());
+  }
   hear<wire::Session>(dds::session_topic());
 }
 
@@ -158,6 +161,7 @@ void SessionClient::take(wire::Session&& sample) {
   worlds_.resize(session_->worlds());
   tellers_.resize(session_->worlds());
   buffer_.emplace(session_->worlds());
+  for (wire::Transfer& transfer : std::exchange(early_transfers_, {})) take(std::move(transfer));
   // What has come before this was not taken, and may be all that there is for now.
   if (following_.transforms)
     for (WorldId world = 0; world < worlds_.size(); ++world) lacking_.emplace(world, Clock::now());
@@ -239,6 +243,16 @@ void SessionClient::take(wire::LogEntry&& sample) {
 void SessionClient::take(wire::Answer&& sample) {
   if (sample.client() != client_ || asked_.erase(sample.number()) == 0) return;
   answers_.push_back(std::move(sample));
+}
+
+void SessionClient::take(wire::Transfer&& sample) {
+  if (!session_) {
+    early_transfers_.push_back(std::move(sample));  // nobody tells it again
+    return;
+  }
+  if (!mine(sample) || sample.world() >= worlds_.size() || sample.taker() >= worlds_.size()) return;
+  // Who was given up by DDS and is met again tells all of them again.
+  if (known_transfers_.emplace(sample.world(), sample.number()).second) transfers_.push_back(std::move(sample));
 }
 
 // ---- what is asked for

@@ -21,6 +21,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -35,7 +36,8 @@ struct Following {
   Step history = 120;  // steps before the displayed one that are kept
   // Called from threads of DDS whenever something has come: to wake whoever will call poll().
   std::function<void()> on_news = {};
-  bool transforms = true;  // otherwise the buffer stays empty, and the worlds need not tell of bodies
+  // Otherwise the buffer stays empty, and the worlds need not tell of bodies; nor are transfers heard.
+  bool transforms = true;
   // Only a session that has begun after this one (wire::Session::started): to follow the next one of a name.
   std::int64_t after = 0;
 };
@@ -80,6 +82,10 @@ class SessionClient {
   };
   const std::vector<Spawned>& spawned() const { return spawned_; }
 
+  // Cells that change hands, each transfer once, in the order in which they were heard: not that of their steps.
+  // Worlds, but not cells, are those of the session.
+  const std::vector<wire::Transfer>& transfers() const { return transfers_; }
+
   // Asks world 0; `request` without client and number. Returns the number that the answer will have.
   std::uint64_t ask(wire::Request request);
   // Answers that have come since the last call. Requests without an answer are told again; after ten seconds the answer
@@ -91,8 +97,8 @@ class SessionClient {
     wire::Transforms sample;
     dds::WriterKey writer;
   };
-  using News =
-      std::variant<wire::Session, wire::SceneChunk, wire::Control, wire::Status, wire::LogEntry, wire::Answer, Told>;
+  using News = std::variant<wire::Session, wire::SceneChunk, wire::Control, wire::Status, wire::LogEntry, wire::Answer,
+                            wire::Transfer, Told>;
   template <class T>
   void hear(const dds::Topic& topic);
   void keep(Told&& told);  // with mutex_ held
@@ -102,6 +108,7 @@ class SessionClient {
   void take(wire::Status&& sample);
   void take(wire::LogEntry&& sample);
   void take(wire::Answer&& sample);
+  void take(wire::Transfer&& sample);
   void take(Told&& told);
   template <class T>
   bool mine(const T& sample);
@@ -139,6 +146,9 @@ class SessionClient {
   std::vector<Spawned> spawned_;
   std::set<std::uint64_t> logged_;    // entries of the action log that were heard
   std::deque<wire::LogEntry> early_;  // of them, those heard before the scene
+  std::vector<wire::Transfer> transfers_;
+  std::set<std::pair<WorldId, std::uint32_t>> known_transfers_;  // giver, number
+  std::deque<wire::Transfer> early_transfers_;                   // heard before the session was known
   std::uint32_t other_protocol_ = 0;
   std::string ended_;
   bool failed_ = false, superseded_ = false;

@@ -101,6 +101,7 @@ void Gateway::look() {
     if (!page->is_open()) continue;
     if (!page->welcomed() && source_->ready()) page->welcome(*source_);
     page->tell_bodies(*source_);
+    page->tell_transfers(*source_);
     page->show(*source_);
   }
   if (now - clocks_at_ >= kClocksEvery) {

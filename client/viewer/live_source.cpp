@@ -1,5 +1,7 @@
 #include "client/viewer/live_source.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -48,6 +50,7 @@ News LiveSource::poll() {
     while (bodies_.size() < heard.size() && (model_->has(heard.id(listed())) || now - stuck_ > kShapePatience))
       bodies_.push_back(heard.id(listed()));
     watch_worlds(news);
+    note_transfers();
   }
   note_speed();
   for (const wire::Answer& answer : client_.take_answers()) {
@@ -89,6 +92,23 @@ void LiveSource::watch_worlds(News& news) {
   }
 }
 
+void LiveSource::note_transfers() {
+  const std::vector<wire::Transfer>& heard = client_.transfers();
+  for (; heard_transfers_ < heard.size(); ++heard_transfers_) {
+    const wire::Transfer& from = heard[heard_transfers_];
+    if (from.cells().back() >= model_->cells()) {  // ascending
+      spdlog::warn("transfer {} of world {} is left alone: there is no cell {}", from.number(), from.world(),
+                   from.cells().back());
+      continue;
+    }
+    view::Transfer& to = transfers_.emplace_back();
+    to.set_step(from.step());
+    to.set_giver(from.world());
+    to.set_taker(from.taker());
+    to.mutable_cell()->Assign(from.cells().begin(), from.cells().end());
+  }
+}
+
 bool LiveSource::silent(WorldId w, Clock::time_point now) const {
   const buffer::SessionClient::World& world = client_.worlds()[w];
   const bool done = world.status && world.status->state() == wire::STATE_DONE;
@@ -120,6 +140,12 @@ view::BodyList LiveSource::bodies(std::uint32_t first, std::uint32_t& meshes) co
   for (; meshes < model_->meshes(); ++meshes) model_->add_mesh(meshes, *list.add_meshes());
   for (std::uint32_t i = first; i < listed(); ++i) model_->list(bodies_[i], list);
   return list;
+}
+
+view::Transfers LiveSource::transfers(std::uint32_t first) const {
+  view::Transfers told;
+  for (std::size_t i = first; i < transfers_.size(); ++i) *told.add_transfer() = transfers_[i];
+  return told;
 }
 
 view::Clocks LiveSource::clocks() const {

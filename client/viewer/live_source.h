@@ -23,6 +23,8 @@ class LiveSource final : public Source {
   view::Welcome welcome() const override;
   std::uint32_t listed() const override { return static_cast<std::uint32_t>(bodies_.size()); }
   view::BodyList bodies(std::uint32_t first, std::uint32_t& meshes) const override;
+  std::uint32_t transfers_known() const override { return static_cast<std::uint32_t>(transfers_.size()); }
+  view::Transfers transfers(std::uint32_t first) const override;
   const buffer::TransformBuffer* buffer() const override { return client_.buffer(); }
   Step displayed() const override { return client_.displayed(); }
   view::Clocks clocks() const override;
@@ -43,6 +45,7 @@ class LiveSource final : public Source {
     bool known = false;
   };
   void watch_worlds(News& news);
+  void note_transfers();
   void note_speed();
   // Nothing is heard of it, and something should be: not so of one that is done, nor of a session that is over.
   bool silent(WorldId world, Clock::time_point now) const;
@@ -55,6 +58,8 @@ class LiveSource final : public Source {
   Clock::time_point stuck_{};   // since then the next one's are not
   std::size_t spawned_ = 0;     // bodies of the log that the model has
   std::vector<Watched> watched_;
+  std::size_t heard_transfers_ = 0;                           // of the client's
+  std::vector<view::Transfer> transfers_;                     // of these, those that the grid can have
   std::deque<std::pair<Clock::time_point, Step>> displayed_;  // of the last second
 };
 

@@ -12,7 +12,7 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 
-constexpr std::uint32_t kProtocol = 2;                       // of viewer.proto
+constexpr std::uint32_t kProtocol = 3;                       // of viewer.proto
 constexpr std::size_t kLargestIncoming = 256 * 1024;         // bytes
 constexpr std::size_t kMostWaiting = std::size_t{64} << 20;  // bytes, beside what can be replaced
 constexpr double kMessagesPerSecond = 240, kBurst = 480;
@@ -112,7 +112,7 @@ void PageLink::welcome(const Source& source) {
   message.mutable_welcome()->set_version(kVersion);
   message.mutable_welcome()->set_may_act(may_act_);
   meshes_ = static_cast<std::uint32_t>(message.welcome().meshes_size());
-  listed_ = 0;
+  listed_ = transfers_ = 0;
   told_bodies_ = false;
   look_.set_offset(0);
   frames_.begin_another();
@@ -120,6 +120,7 @@ void PageLink::welcome(const Source& source) {
   welcomed_ = true;
   tell(std::move(message));
   tell_bodies(source);
+  tell_transfers(source);
 }
 
 void PageLink::tell_bodies(const Source& source) {
@@ -129,6 +130,14 @@ void PageLink::tell_bodies(const Source& source) {
   *message.mutable_bodies() = source.bodies(listed_, meshes_);
   listed_ = source.listed();
   frames_.begin_anew();
+  tell(std::move(message));
+}
+
+void PageLink::tell_transfers(const Source& source) {
+  if (!welcomed_ || transfers_ == source.transfers_known()) return;
+  view::ToPage message;
+  *message.mutable_transfers() = source.transfers(transfers_);
+  transfers_ = source.transfers_known();
   tell(std::move(message));
 }
 

@@ -46,6 +46,7 @@ class PageLink : public std::enable_shared_from_this<PageLink> {
   }
   bool forgotten() const { return forgotten_; }  // shows a source that is gone, until the next welcome
   void tell_bodies(const Source& source);        // those that it has not been told
+  void tell_transfers(const Source& source);     // likewise
   void show(const Source& source);               // a frame, if there is something new and the page is ready for it
   void tell_ended(const End& end);               // once
   void tell(view::ToPage message);               // surely, in order
@@ -71,7 +72,7 @@ class PageLink : public std::enable_shared_from_this<PageLink> {
   std::optional<std::string> clocks_, worlds_;
   FrameMaker frames_;
   std::uint32_t shown_ = 0;  // newest frame that the page has taken
-  std::uint32_t listed_ = 0, meshes_ = 0;
+  std::uint32_t listed_ = 0, meshes_ = 0, transfers_ = 0;
   view::Look look_;
   double budget_;  // messages that it may send now
   Clock::time_point budget_at_;

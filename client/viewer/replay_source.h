@@ -24,6 +24,8 @@ class ReplaySource final : public Source {
   view::Welcome welcome() const override;
   std::uint32_t listed() const override { return buffer_.bodies().size(); }
   view::BodyList bodies(std::uint32_t first, std::uint32_t& meshes) const override;
+  std::uint32_t transfers_known() const override { return 0; }  // it has no territories
+  view::Transfers transfers(std::uint32_t) const override { return {}; }
   const buffer::TransformBuffer* buffer() const override { return &buffer_; }
   Step displayed() const override;
   view::Clocks clocks() const override;

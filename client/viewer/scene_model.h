@@ -21,6 +21,7 @@ class SceneModel {
   void add(BodyId id, const Scene& shape);  // spawned: a scene of that body alone
   bool has(BodyId id) const { return bodies_.contains(id); }
 
+  std::size_t cells() const { return welcome_.grid().owner().size() / sizeof(std::uint16_t); }  // of the territory grid
   void fill(view::Welcome& welcome) const;  // scene, dt, gravity, box, grid, statics, the meshes so far
   std::uint32_t meshes() const { return static_cast<std::uint32_t>(meshes_.meshes().size()); }
   void add_mesh(std::uint32_t number, view::Mesh& mesh) const;

@@ -42,6 +42,10 @@ class Source {
   virtual std::uint32_t listed() const = 0;
   virtual view::BodyList bodies(std::uint32_t first, std::uint32_t& meshes) const = 0;
 
+  // How many transfers of cells are known, and those from number `first` on, in the order in which they became known.
+  virtual std::uint32_t transfers_known() const = 0;
+  virtual view::Transfers transfers(std::uint32_t first) const = 0;
+
   virtual const buffer::TransformBuffer* buffer() const = 0;
   virtual Step displayed() const = 0;
   virtual view::Clocks clocks() const = 0;

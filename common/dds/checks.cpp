@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <initializer_list>
 #include <stdexcept>
 
 #include "common/actions/action.h"
 #include "common/body_state.h"
 #include "common/contact_record.h"
+#include "common/grid.h"
 #include "common/run_settings.h"
 #include "common/version.h"
 
@@ -108,6 +110,12 @@ bool lengths_fit<wire::Transforms>(Cdr& cdr) {
        std::int64_t>(cdr);
   return pass_sequence<std::uint64_t>(cdr) && pass_sequence<double>(cdr) && pass_sequence<float>(cdr) &&
          pass_sequence<float>(cdr) && pass_sequence<std::uint8_t>(cdr) && pass_sequence<std::uint64_t>(cdr);
+}
+
+template <>
+bool lengths_fit<wire::Transfer>(Cdr& cdr) {
+  skip<std::uint64_t, std::uint32_t, std::uint32_t, std::int64_t, std::uint32_t>(cdr);
+  return pass_sequence<std::uint32_t>(cdr);
 }
 
 std::string problem(const wire::Session& s) {
@@ -226,6 +234,16 @@ std::string problem(const wire::Transforms& s) {
     return "bad lengths";
   return finite(s.positions()) && finite(s.orientations()) && finite(s.velocities()) ? ""
                                                                                      : "a value that is not finite";
+}
+
+std::string problem(const wire::Transfer& s) {
+  if (s.world() >= kMaxWorlds || s.taker() >= kMaxWorlds || s.taker() == s.world()) return "impossible world";
+  if (s.number() == 0) return "no number";
+  if (!ok_step(s.step()) || s.step() == 0) return "impossible step";
+  if (s.cells().empty() || s.cells().size() > kMaxTransferCells) return "impossible number of cells";
+  if (std::adjacent_find(s.cells().begin(), s.cells().end(), std::greater_equal<>()) != s.cells().end())
+    return "cells out of order";
+  return s.cells().back() < kMaxCells ? "" : "impossible cell";
 }
 
 std::string problem(const wire::Lack& s) { return s.world() < kMaxWorlds ? "" : "impossible world"; }

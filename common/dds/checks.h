@@ -20,9 +20,10 @@ constexpr std::int64_t kMaxStepNumber = std::int64_t{1} << 40;  // 500 years at 
 constexpr std::size_t kMaxChunkBytes = 512 * 1024;              // of a scene or a state in one sample
 constexpr std::size_t kMaxBorderBytes = 256 * 1024 * 1024;      // of one border message
 constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 32;
-constexpr std::size_t kMaxPoses = 16384;    // in one sample
-constexpr std::size_t kMaxDigests = 65536;  // steps in one sample
-constexpr std::size_t kMaxText = 1024;      // bytes of any string
+constexpr std::size_t kMaxPoses = 16384;          // in one sample
+constexpr std::size_t kMaxDigests = 65536;        // steps in one sample
+constexpr std::size_t kMaxTransferCells = 65536;  // in one transfer; the balancer gives at most 4,096
+constexpr std::size_t kMaxText = 1024;            // bytes of any string
 
 // Whether the lengths of the sample's sequences fit into what follows them. Run before the sample is taken apart,
 // because Fast CDR allocates what a length says before it looks for the elements. True for types without sequences.
@@ -44,6 +45,7 @@ std::string problem(const wire::Digests& s);
 std::string problem(const wire::StateChunk& s);
 std::string problem(const wire::Poses& s);
 std::string problem(const wire::Transforms& s);
+std::string problem(const wire::Transfer& s);
 std::string problem(const wire::Lack& s);
 
 // Whether a name may be a session's: 1 to 64 letters, digits, dots, dashes and underscores. (It becomes a DDS

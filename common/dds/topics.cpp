@@ -6,6 +6,7 @@ namespace soda::dds {
 namespace {
 
 constexpr int kManyWorlds = static_cast<int>(kMaxWorlds);
+constexpr int kTransfersKept = 4096;  // of each giver
 
 // The newest sample of each instance, for whoever comes.
 Flow newest(int instances) {
@@ -70,6 +71,15 @@ Topic transforms_topic() {
   Topic topic{"soda/transforms", newest(kManyWorlds)};
   topic.flow.keep_last = 32;
   topic.flow.max_samples = 32 * kManyWorlds;
+  return topic;
+}
+
+// Who comes later needs them all to know who owns what; a crowd that walks makes about one per second and world, of
+// some dozens of cells. A write does not wait for viewers.
+Topic transfers_topic() {
+  Topic topic{"soda/transfers", newest(kManyWorlds)};
+  topic.flow.keep_last = kTransfersKept;
+  topic.flow.max_samples = kTransfersKept * kManyWorlds;
   return topic;
 }
 

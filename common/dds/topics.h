@@ -39,6 +39,7 @@ Topic digests_topic();                         // Digests
 Topic states_topic();                          // StateChunk
 Topic poses_topic();                           // Poses
 Topic transforms_topic();                      // Transforms
+Topic transfers_topic();                       // Transfer
 Topic lack_topic();                            // Lack
 Topic border_topic(WorldId from, WorldId to);  // Border
 

@@ -68,7 +68,8 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core.balance = settings.balance;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
-  if (settings.balance && settings.worlds > 1) balancer_.emplace(*core_, map_.grid, settings.me, model_.scene().dt, settings.window);
+  if (settings.balance && settings.worlds > 1)
+    balancer_.emplace(*core_, map_.grid, settings.me, model_.scene().dt, settings.window);
   lines_.resize(settings.worlds);
   open_lines();
 }
@@ -147,9 +148,18 @@ soda::balance::Pace Daemon::pace() const {
 
 void Daemon::balance() {
   balancer_->consider(pace());
-  for (const border::Transfer& t : core_->take_transfers())
-    if (t.giver == settings_.me)
-      spdlog::info("gives {} cells to world {} from step {} on", t.cells.size(), t.taker, t.step);
+  for (border::Transfer& t : core_->take_transfers()) {
+    if (t.giver != settings_.me) continue;  // its giver tells it
+    spdlog::info("gives {} cells to world {} from step {} on", t.cells.size(), t.taker, t.step);
+    wire::Transfer told;
+    told.instance(settings_.instance);
+    told.world(t.giver);
+    told.number(t.number);
+    told.step(t.step);
+    told.taker(t.taker);
+    told.cells(std::move(t.cells));
+    reports_.transfer(told);
+  }
 }
 
 void Daemon::release() {

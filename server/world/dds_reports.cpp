@@ -24,6 +24,7 @@ DdsReports::DdsReports(dds::Participant& participant, std::uint64_t instance, Wo
       give_up_(std::move(give_up)),
       status_(participant, dds::status_topic()),
       digests_(participant, dds::digests_topic()),
+      transfers_(participant, dds::transfers_topic()),
       transforms_(participant, dds::transforms_topic(),
                   [this](int change) {
                     if (change > 0) lack_.store(true);
@@ -55,6 +56,9 @@ void DdsReports::poses(const wire::Poses& sample) {
   write_surely(*poses_, sample, give_up_);
 }
 
+// It is told once, and who lacks it would be wrong about its cells for the rest of the session.
+void DdsReports::transfer(const wire::Transfer& sample) { write_surely(transfers_, sample, give_up_); }
+
 void DdsReports::transforms(const wire::Transforms& sample) { transforms_.write(sample); }
 
 bool DdsReports::finish(std::chrono::milliseconds at_most) {
@@ -66,6 +70,7 @@ bool DdsReports::finish(std::chrono::milliseconds at_most) {
   bool all = digests_.wait_acknowledged(left());
   // Viewers shall see the end, but nobody waits long for them; world 0 has, for it has said that this world may go.
   (void)status_.wait_acknowledged(std::min(left(), std::chrono::milliseconds(300)));
+  (void)transfers_.wait_acknowledged(std::min(left(), std::chrono::milliseconds(300)));
   (void)transforms_.wait_acknowledged(std::min(left(), std::chrono::milliseconds(300)));
   if (poses_) all = poses_->wait_acknowledged(left()) && all;
   if (states_) all = states_->wait_acknowledged(left()) && all;

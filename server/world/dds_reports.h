@@ -21,6 +21,7 @@ class DdsReports final : public Reports {
   void digests(const wire::Digests& sample) override;
   void state(const wire::StateChunk& sample) override;
   void poses(const wire::Poses& sample) override;
+  void transfer(const wire::Transfer& sample) override;
   bool wants_transforms() const override { return transforms_.matched(); }
   bool take_lack() override { return lack_.exchange(false); }
   void transforms(const wire::Transforms& sample) override;
@@ -32,6 +33,7 @@ class DdsReports final : public Reports {
   std::atomic<bool> lack_{false};
   dds::Writer<wire::Status> status_;
   dds::Writer<wire::Digests> digests_;
+  dds::Writer<wire::Transfer> transfers_;
   dds::Writer<wire::Transforms> transforms_;
   dds::Reader<wire::Lack> lacks_;
   std::unique_ptr<dds::Writer<wire::StateChunk>> states_;

@@ -24,6 +24,7 @@ class PipeReports final : public Reports {
   void digests(const wire::Digests& sample) override { write(sample); }
   void state(const wire::StateChunk& sample) override { write(sample); }
   void poses(const wire::Poses& sample) override { write(sample); }
+  void transfer(const wire::Transfer&) override {}  // a world that is alone has nobody to give to
   // What the session service says; from its thread.
   void control(const wire::Control& sample) { write(sample); }
   void entry(const wire::LogEntry& sample) { write(sample); }

@@ -19,6 +19,8 @@ class Reports {
   virtual void digests(const wire::Digests& sample) = 0;
   virtual void state(const wire::StateChunk& sample) = 0;
   virtual void poses(const wire::Poses& sample) = 0;
+  // Of which this world is the giver, each once.
+  virtual void transfer(const wire::Transfer& sample) = 0;
   virtual bool wants_transforms() const = 0;
   // Whether somebody has begun to read transforms, or said that some are lacking, since the last call.
   virtual bool take_lack() = 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstring>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <thread>
 
 #include "common/dump.h"
+#include "common/grid.h"
 #include "common/recording/recording.h"
 #include "tests/distributed/live_session.h"
 #include "tests/support/page.h"
@@ -101,6 +103,63 @@ TEST_F(Viewer, ShowsThePastAndTheFutureAndChangesNothing) {
   expect_equal_logs(path("log"), path("single"));
   gateway().signal(SIGTERM);
   expect_exit(gateway(), 0, 10s);
+}
+
+// Bodies of the page's frame that are not where the territories of its step say: in a cell of another world than the
+// one that produced them. Those that have just crossed a border are among them. `transfers`: with those that it knows.
+int misplaced(const Page& page, bool transfers) {
+  const view::Grid& told = page.welcome.grid();
+  Grid grid;
+  for (int axis = 0; axis < 3; ++axis) {
+    grid.origin[axis] = told.origin(axis);
+    grid.size[axis] = told.size(axis);
+  }
+  grid.edge = told.edge();
+  std::vector<std::uint16_t> owner(grid.cells());
+  std::memcpy(owner.data(), told.owner().data(), told.owner().size());
+  std::vector<view::Transfer> done = transfers ? page.transfers : std::vector<view::Transfer>();
+  std::sort(done.begin(), done.end(), [](const auto& l, const auto& r) { return l.step() < r.step(); });
+  for (const view::Transfer& transfer : done)
+    if (transfer.step() < page.frame.step())  // a body is produced by the world that owned it a step earlier
+      for (const std::uint32_t cell : transfer.cell()) owner.at(cell) = static_cast<std::uint16_t>(transfer.taker());
+  return static_cast<int>(std::count_if(page.bodies.begin(), page.bodies.end(), [&](const auto& entry) {
+    const auto& [x, y, z] = entry.second.position;
+    return owner[grid.index(grid.cell_of(Vec3(x, y, z)))] != entry.second.world;
+  }));
+}
+
+// One world has nearly everything at the start, so that cells change hands.
+TEST_F(Viewer, TerritoriesAreThoseOfTheStepThatIsShown) {
+  std::ofstream(path("hand.txtpb"))
+      << "territory { world: 1 min { x: 8 y: 8 z: -1000 } max { x: 1000 y: 1000 z: 1000 } }\n"
+         "territory { world: 2 min { x: 8 y: -1000 z: -1000 } max { x: 1000 y: 8 z: 1000 } }\n"
+         "territory { world: 0 min { x: -1000 y: -1000 z: -1000 } max { x: 8 y: 1000 z: 1000 } }\n";
+  auto running = start(scene("city", 1000), 3, 100'000, {"--territories", path("hand.txtpb"), "--pace", "max"});
+  serve();
+  auto page = open(kWatching);
+  const auto shown = [](Page& page) {
+    return page.until(
+        [&] { return page.transfers.size() > 2 && misplaced(page, true) <= 20 && misplaced(page, false) > 100; });
+  };
+  const auto failure = [](const Page& page) {
+    return std::to_string(page.transfers.size()) + " transfers, " + std::to_string(page.bodies.size()) + " bodies, " +
+           std::to_string(misplaced(page, true)) + " misplaced, without transfers " +
+           std::to_string(misplaced(page, false)) + " at step " + std::to_string(page.frame.step());
+  };
+  EXPECT_TRUE(shown(*page)) << failure(*page);
+  for (const view::Transfer& transfer : page->transfers) {
+    EXPECT_NE(transfer.giver(), transfer.taker());
+    EXPECT_LT(std::max(transfer.giver(), transfer.taker()), 3u);
+    EXPECT_GT(transfer.step(), 0);
+    EXPECT_GT(transfer.cell_size(), 0);
+  }
+  // Who comes late is told what has changed hands before: the page, and the gateway, too.
+  serve();
+  auto late = open(kWatching);
+  EXPECT_TRUE(shown(*late)) << failure(*late);
+  EXPECT_GE(late->transfers.size(), page->transfers.size());
+  running->signal(SIGINT);
+  expect_exit(*running, 128 + SIGINT);
 }
 
 TEST_F(Viewer, OneMayActWithTheTokenOnly) {

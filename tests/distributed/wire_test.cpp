@@ -5,12 +5,14 @@
 
 #include <array>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <thread>
 
 #include "common/dds/cdr.h"
 #include "common/dds/checks.h"
 #include "common/dds/frames.h"
+#include "common/grid.h"
 #include "common/version.h"
 
 namespace soda::dds {
@@ -67,6 +69,17 @@ wire::Transforms good_transforms() {
   return s;
 }
 
+wire::Transfer good_transfer() {
+  wire::Transfer s;
+  s.instance(7);
+  s.world(1);
+  s.number(3);
+  s.step(90);
+  s.taker(2);
+  s.cells({4, 9, 17});
+  return s;
+}
+
 wire::Border good_border() {
   wire::Border s;
   s.from(1);
@@ -112,6 +125,7 @@ TEST(Wire, ComesBack) {
   expect_round_trip(good_digests());
   expect_round_trip(good_state());
   expect_round_trip(good_transforms());
+  expect_round_trip(good_transfer());
   expect_round_trip(good_border());
   expect_round_trip(good_poses());
   expect_round_trip(good_request());
@@ -142,6 +156,7 @@ TEST(Wire, TruncatedOrScrambledIsRefusedOrHarmless) {
   expect_never_crashes(good_digests());
   expect_never_crashes(good_state());
   expect_never_crashes(good_transforms());
+  expect_never_crashes(good_transfer());
   expect_never_crashes(good_border());
   expect_never_crashes(good_poses());
   expect_never_crashes(good_request());
@@ -193,6 +208,20 @@ TEST(Wire, ImpossibleValuesAreRefused) {
   refused(good_transforms(), [](auto& s) { s.flags().pop_back(); });
   refused(good_transforms(), [](auto& s) { s.kind(3); });
   refused(good_transforms(), [](auto& s) { s.number(0); });
+  refused(good_transfer(), [](auto& s) { s.world(kMaxWorlds); });
+  refused(good_transfer(), [](auto& s) { s.taker(kMaxWorlds); });
+  refused(good_transfer(), [](auto& s) { s.taker(1); });  // itself
+  refused(good_transfer(), [](auto& s) { s.number(0); });
+  refused(good_transfer(), [](auto& s) { s.step(0); });  // the initial territories say who owns what there
+  refused(good_transfer(), [](auto& s) { s.step(kMaxStepNumber + 1); });
+  refused(good_transfer(), [](auto& s) { s.cells().clear(); });
+  refused(good_transfer(), [](auto& s) { s.cells({4, 4}); });
+  refused(good_transfer(), [](auto& s) { s.cells({9, 4}); });
+  refused(good_transfer(), [](auto& s) { s.cells({kMaxCells}); });
+  refused(good_transfer(), [](auto& s) {
+    s.cells().resize(kMaxTransferCells + 1);
+    std::iota(s.cells().begin(), s.cells().end(), 0u);
+  });
   refused(good_border(), [](auto& s) { s.to(kMaxWorlds); });
   refused(good_session(), [](auto& s) { s.lead(0); });
   refused(good_poses(), [](auto& s) { s.ids().pop_back(); });

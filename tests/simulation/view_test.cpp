@@ -25,6 +25,7 @@ class Samples final : public world::Reports {
   void digests(const wire::Digests&) override {}
   void state(const wire::StateChunk&) override {}
   void poses(const wire::Poses&) override {}
+  void transfer(const wire::Transfer&) override {}
   bool wants_transforms() const override { return watched; }
   bool take_lack() override { return std::exchange(lack, false); }
   void transforms(const wire::Transforms& sample) override { told.push_back(sample); }

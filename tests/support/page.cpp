@@ -95,11 +95,15 @@ void Page::take(const view::ToPage& message) {
       ended.clear();
       ids.clear();
       bodies.clear();
+      transfers.clear();
       break;
     case view::ToPage::kBodies:
       ids.resize(message.bodies().first());
       ids.insert(ids.end(), message.bodies().id().begin(), message.bodies().id().end());
       for (int i = 0; i < message.bodies().id_size(); ++i) mass[message.bodies().id(i)] = message.bodies().mass(i);
+      break;
+    case view::ToPage::kTransfers:
+      transfers.insert(transfers.end(), message.transfers().transfer().begin(), message.transfers().transfer().end());
       break;
     case view::ToPage::kFrame:
       take(message.frame());

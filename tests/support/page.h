@@ -45,6 +45,7 @@ class Page {
   std::uint64_t frames = 0, wholes = 0, bytes = 0, redone = 0;
   view::Clocks clocks;
   view::Worlds worlds;
+  std::vector<view::Transfer> transfers;
   std::vector<view::Answer> answers;
   std::vector<view::Rollback> rollbacks;
   std::vector<std::string> events;

@@ -58,6 +58,7 @@ class LedgerReports final : public Reports {
   void digests(const wire::Digests& sample) override { ledger_.add(sample); }
   void state(const wire::StateChunk&) override {}
   void poses(const wire::Poses&) override {}
+  void transfer(const wire::Transfer&) override {}
   bool wants_transforms() const override { return true; }
   bool take_lack() override { return false; }
   void transforms(const wire::Transforms& sample) override { transforms_ += sample.ids().size(); }

@@ -21,6 +21,7 @@ export interface SodaDebug {
   readonly answers: readonly AnswerRecord[];
   connected(): boolean;
   worlds(): object[];
+  cells(): number[]; // that each world owns at the step that is shown
   mayAct(): boolean;
 }
 
@@ -72,6 +73,7 @@ export function expose(picture: Picture, session: Session, requests: Requests, r
         rollbacks: Number(state.rollbacks),
         ...session.rows[world],
       })),
+    cells: () => picture.cells(),
     mayAct: () => session.mayAct,
   };
 }

@@ -57,6 +57,7 @@ const session: Session = new Session({
     looking.again();
   },
   bodies: (list) => picture.addBodies(list),
+  transfers: (list) => picture.addTransfers(list),
   frame(frame) {
     picture.takeFrame(frame, seconds());
     framesTaken = frame.number;

@@ -3,7 +3,7 @@ import { create } from '@bufbuild/protobuf';
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Shapes } from '../src/draw/shapes';
-import { BodyListSchema, GridSchema } from '../src/gen/viewer_pb';
+import { BodyListSchema, GridSchema, TransferSchema } from '../src/gen/viewer_pb';
 import { Bodies } from '../src/model/bodies';
 import { Grid } from '../src/model/grid';
 import { Playback } from '../src/model/playback';
@@ -135,6 +135,45 @@ test('borders are put together into few rectangles', () => {
   assert.equal(faces.length, 1);
   assert.deepEqual(faces[0], { axis: 0, at: 6, low: [0, 1], high: [20, 11], below: 0, above: 1 });
   assert.deepEqual(grid.centres(2)[0], [-2, 10, 6]);
+});
+
+test('cells change hands at the steps of their transfers, forwards and backwards', () => {
+  const size = [6, 1, 1];
+  const owner = Uint16Array.of(0, 0, 0, 0, 1, 1);
+  const grid = new Grid(create(GridSchema, { origin: [0, 0, 0], edge: 1, size, owner: new Uint8Array(owner.buffer) }));
+  const transfer = (step: number, giver: number, taker: number, cell: number[]) =>
+    create(TransferSchema, { step: BigInt(step), giver, taker, cell });
+  const owners = () => [...grid.owner];
+  const borders = () => grid.faces().map(({ at, below, above }) => [at, below, above]);
+  assert.equal(grid.goTo(10), false, 'nothing is known yet');
+  grid.add([transfer(20, 0, 1, [3]), transfer(40, 1, 2, [4, 5])]);
+  assert.equal(grid.goTo(19), false);
+  assert.deepEqual(owners(), [0, 0, 0, 0, 1, 1]);
+  assert.deepEqual(borders(), [[4, 0, 1]]);
+  assert.equal(grid.goTo(20), true);
+  assert.deepEqual(owners(), [0, 0, 0, 1, 1, 1]);
+  assert.deepEqual(borders(), [[3, 0, 1]]);
+  assert.deepEqual(grid.cells(3), [3, 3, 0]);
+  assert.equal(grid.goTo(39), false, 'walls are not to be made anew');
+  assert.equal(grid.goTo(90), true);
+  assert.deepEqual(owners(), [0, 0, 0, 1, 2, 2]);
+  assert.equal(grid.goTo(40), false);
+  assert.equal(grid.goTo(39), true, 'back in time');
+  assert.deepEqual(owners(), [0, 0, 0, 1, 1, 1]);
+  assert.equal(grid.goTo(0), true);
+  assert.deepEqual(owners(), [0, 0, 0, 0, 1, 1]);
+  grid.goTo(50);
+  // One that became known late counts before those of later steps: cell 5 goes to 0 first, and then on to 2.
+  grid.add([transfer(30, 1, 0, [5, 3])]);
+  assert.equal(grid.goTo(50), true);
+  assert.deepEqual(owners(), [0, 0, 0, 0, 2, 2]);
+  assert.equal(grid.goTo(50), false);
+  grid.goTo(35);
+  assert.deepEqual(owners(), [0, 0, 0, 0, 1, 0]);
+  // Cells that there are not are left alone.
+  grid.add([transfer(36, 0, 1, [2, 6, 4000000])]);
+  assert.equal(grid.goTo(36), true);
+  assert.deepEqual(owners(), [0, 0, 1, 0, 1, 0]);
 });
 
 test('boxes of all sizes are one shape, and so are spheres', () => {

@@ -19,9 +19,9 @@ describe('the page', { skip: existsSync(chromium) ? false : 'there is no chromiu
   const problems: string[] = [];
 
   before(async () => {
-    mock = await startMock(port, ['--bodies', '300', '--worlds', '3']);
+    mock = await startMock(port, ['--bodies', '300', '--worlds', '3', '--balance']);
     browser = await startBrowser();
-    page = await openPage(browser, `${base}?token=mock#quality=minimal`, 1000, 640, true, problems, 100);
+    page = await openPage(browser, `${base}?token=mock#quality=minimal&show=b`, 1000, 640, true, problems, 100);
   });
   after(async () => {
     await browser?.close();
@@ -55,6 +55,34 @@ describe('the page', { skip: existsSync(chromium) ? false : 'there is no chromiu
     await page.waitForFunction(() => window.soda.step() < window.soda.displayed(), null, limit);
     await page.keyboard.press('l');
     await told('live');
+  });
+
+  test('shows the territories of the step that is shown', async () => {
+    const cells = () => page.evaluate(() => window.soda.cells());
+    const shows = (offset: number) =>
+      page.waitForFunction((by) => window.soda.step() === window.soda.displayed() + by, offset, limit);
+    await page.waitForFunction(() => window.soda.displayed() > 200, null, limit);
+    await pause();
+    await shows(0);
+    const now = await cells();
+    for (let k = 0; k < 6; k++) await page.keyboard.press('Shift+ArrowLeft');
+    await shows(-60);
+    const before = await cells(); // one transfer earlier
+    assert.notDeepEqual(before, now);
+    assert.equal(before.reduce((a, b) => a + b), now.reduce((a, b) => a + b));
+    await page.keyboard.press('l');
+    await shows(0);
+    assert.deepEqual(await cells(), now);
+    await resume();
+    // A page that comes later is told what has changed hands before.
+    const late = await openPage(browser, `${base}#quality=minimal`, 600, 400, true, problems, 100);
+    await pause();
+    await shows(0);
+    await late.waitForFunction(() => window.soda.step() === window.soda.displayed(), null, limit);
+    const [here, there] = [await cells(), await late.evaluate(() => window.soda.cells())];
+    assert.deepEqual(there, here);
+    await late.context().close();
+    await resume();
   });
 
   test('pauses, does one step, resumes', async () => {

@@ -9,7 +9,7 @@ import { parseArgs } from 'node:util';
 import { WebSocketServer } from 'ws';
 import {
   AnswerSchema, BodyListSchema, ClocksSchema, EndedSchema, EventsSchema, FromPageSchema, RollbackSchema, WelcomeSchema,
-  WorldsSchema, WorldStateSchema, type BodyList, type Do, type Mesh, type ToPage,
+  TransferSchema, TransfersSchema, WorldsSchema, WorldStateSchema, type BodyList, type Do, type Mesh, type ToPage, type Transfer,
 } from '../src/gen/viewer_pb';
 import { protocol } from '../src/model/session';
 import { Client } from './mock/client';
@@ -26,13 +26,14 @@ const { values: options } = parseArgs({
     token: { type: 'string', default: 'mock' },
     plain: { type: 'boolean', default: false }, // all bodies grey
     trouble: { type: 'boolean', default: false }, // world 1 falls behind, then silent, for some seconds at a time
+    balance: { type: 'boolean', default: false }, // every 60 steps some cells change hands
     replay: { type: 'boolean', default: false },
     gather: { type: 'string', default: '0' }, // s until the run begins
     end: { type: 'string', default: '0' }, // s until the session ends; 0: never
   },
 });
 if (options.help) {
-  console.log('mock [--port N] [--bodies N] [--worlds N] [--scene city|cubes] [--token T] [--plain] [--trouble] [--replay] [--gather S] [--end S]');
+  console.log('mock [--port N] [--bodies N] [--worlds N] [--scene city|cubes] [--token T] [--plain] [--trouble] [--balance] [--replay] [--gather S] [--end S]');
   process.exit(0);
 }
 
@@ -80,10 +81,12 @@ function worldStates(): void {
   const owned = new Array<number>(worlds).fill(0);
   const state = simulation.state(simulation.displayed)!;
   for (let i = 0; i < state.there.length; i++) if (state.there[i]) owned[simulation.ownerOf(state, i)]!++;
+  scene.territories.goTo(simulation.displayed);
+  const cells = scene.territories.cells(worlds);
   const world = owned.map((count, w): MessageInitShape<typeof WorldStateSchema> => ({
     host: 'mock', pid: 1000 + w,
     state: gathering() ? (w < worlds / 2 ? 'ready' : 'unknown') : silent(w) ? 'silent' : 'running',
-    bodies: BigInt(count), cells: BigInt(scene.owners.filter((o) => o === w).length), neighbours: worlds - 1,
+    bodies: BigInt(count), cells: BigInt(cells[w]!), neighbours: worlds - 1,
     waitingFor: troubled(w) ? -1 : options.trouble && troubled(1) ? 1 : seconds() % 3 < 1 ? (w + 1) % worlds : -1,
     stepsPerSecond: 60 * pace, load: Math.min(1, 0.25 + count / bodies + 0.15 * Math.sin(seconds() + w) + (troubled(w) ? 0.4 : 0)),
     waiting: 0.1 + 0.08 * Math.sin(seconds() * 0.6 + w), syncs: BigInt(simulation.displayed * 3), mixedIslands: 5n,
@@ -110,6 +113,34 @@ function someRollback(): void {
     count++;
   }
   if (count) rollback(w, simulation.displayed + 2, 3 + Math.floor(Math.random() * 12), count * 4);
+}
+
+// One world after the other gives a neighbour the cells along their border, and gets them back the next time.
+const transfers: Transfer[] = [];
+function someTransfer(): void {
+  const { territories } = scene;
+  const [nx, ny, nz] = territories.size;
+  const step = BigInt(simulation.newest + 8);
+  territories.goTo(Number(step));
+  const last = transfers.at(-1);
+  const number = transfers.length;
+  let transfer = create(TransferSchema, { step, giver: last?.taker, taker: last?.giver, cell: last?.cell });
+  if (number % 2 === 0) {
+    const giver = (number / 2) % worlds;
+    const ownerBeside = (cell: number, along: number, by: number, size: number) => {
+      const at = (Math.floor(cell / along) % size) + by;
+      return at < 0 || at >= size ? giver : territories.owner[cell + by * along]!;
+    };
+    const owners = (cell: number) =>
+      [[1, nx], [nx, ny], [nx * ny, nz]].flatMap(([along, size]) => [-1, 1].map((by) => ownerBeside(cell, along!, by, size!)));
+    const own = [...territories.owner.keys()].filter((cell) => territories.owner[cell] === giver);
+    const taker = own.flatMap(owners).find((w) => w !== giver);
+    if (taker === undefined) return;
+    transfer = create(TransferSchema, { step, giver, taker, cell: own.filter((cell) => owners(cell).includes(taker)) });
+  }
+  transfers.push(transfer);
+  territories.add([transfer]);
+  tell({ case: 'transfers', value: create(TransfersSchema, { transfer: [transfer] }) });
 }
 
 function handle(client: Client, request: Do): void {
@@ -175,6 +206,7 @@ new WebSocketServer({ server, path: '/ws' }).on('connection', (socket, request) 
     }),
   });
   client.send({ case: 'bodies', value: bodyList(0) });
+  client.send({ case: 'transfers', value: create(TransfersSchema, { transfer: transfers }) });
   clients.add(client);
   socket.on('close', () => clients.delete(client));
   socket.on('message', (data: Buffer) => {
@@ -196,6 +228,7 @@ setInterval(() => {
     if (gathering() || (paused && extra === 0)) continue;
     if (paused) extra--;
     simulation.advance();
+    if (options.balance && simulation.displayed % 60 === 0) someTransfer();
   }
   due = Math.max(due, now - 100);
   const final = finalOf();

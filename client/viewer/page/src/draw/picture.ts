@@ -1,6 +1,6 @@
 // The scene as a whole: it takes what the session tells, and draws a picture when asked to.
 import { Color, Vector3 } from 'three';
-import { FrameFlag, type BodyList, type Frame, type Welcome } from '../gen/viewer_pb';
+import { FrameFlag, type BodyList, type Frame, type Transfer, type Welcome } from '../gen/viewer_pb';
 import { Bodies } from '../model/bodies';
 import { Grid } from '../model/grid';
 import { Playback } from '../model/playback';
@@ -31,6 +31,9 @@ export class Picture {
   readonly colours: BodyColours;
   playback: Playback | null = null;
   readonly statics: Statics;
+  private grid = new Grid(undefined);
+  private worlds = 0;
+  private ownersDrawn = false; // as they are at the step that is shown
   private territory: Territory;
   private labels: Labels;
   private occlusion: Occlusion;
@@ -80,10 +83,10 @@ export class Picture {
     this.marks.clear();
     this.playback = new Playback(this.bodies, this, welcome.dt || 1 / 60);
     for (const mesh of welcome.meshes) this.shapes.add(mesh);
-    const grid = new Grid(welcome.grid);
-    this.statics.build(welcome.statics, welcome.meshes, low, high, up, grid);
-    this.territory.build(grid);
-    this.labels.build(grid, welcome.worlds);
+    this.grid = new Grid(welcome.grid);
+    this.worlds = welcome.worlds;
+    this.statics.build(welcome.statics, welcome.meshes, low, high, up, this.grid);
+    this.ownersDrawn = false;
     if (!again) {
       this.stage.setUp(up);
       this.views.setScene(low, high);
@@ -96,6 +99,10 @@ export class Picture {
   addBodies(list: BodyList): void {
     for (const mesh of list.meshes) this.shapes.add(mesh);
     this.bodies.add(list);
+  }
+
+  addTransfers(list: Transfer[]): void {
+    this.grid.add(list);
   }
 
   takeFrame(frame: Frame, now: number): void {
@@ -121,6 +128,7 @@ export class Picture {
   draw(now: number): void {
     bodyUniforms.uTime.value = now;
     this.playback?.advance(now);
+    this.drawOwners();
     this.instances.upload();
     this.views.update();
     const { camera } = this.stage;
@@ -154,6 +162,12 @@ export class Picture {
     return [box.left + (0.5 + 0.5 * at.x) * box.width, box.top + (0.5 - 0.5 * at.y) * box.height];
   }
 
+  // How many cells each world owns at the step that is shown.
+  cells(): number[] {
+    this.passTransfers();
+    return this.grid.cells(this.worlds);
+  }
+
   // ---- what Playback tells ----
 
   appeared(body: number): void {
@@ -173,6 +187,20 @@ export class Picture {
     const now = bodyUniforms.uTime.value;
     for (const body of bodies)
       if (this.bodies.flags[body]! & FrameFlag.FLAG_REDONE) this.instances.flash(body, now);
+  }
+
+  private passTransfers(): void {
+    if (this.grid.goTo(this.playback?.step() ?? 0)) this.ownersDrawn = false;
+  }
+
+  // Borders are made anew only where some are to be seen, and only once the step has passed a transfer of cells.
+  private drawOwners(): void {
+    this.passTransfers();
+    if (this.ownersDrawn || !this.settings.now.borders) return;
+    this.ownersDrawn = true;
+    this.statics.paint(this.grid);
+    this.territory.build(this.grid);
+    this.labels.build(this.grid, this.worlds);
   }
 
   private applySettings(): void {

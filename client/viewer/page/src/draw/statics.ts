@@ -131,21 +131,27 @@ export class Statics {
       this.uniforms.uOwners.value = null;
       return;
     }
-    const data = new Uint8Array(4 * cells);
-    for (let c = 0; c < cells; c++) {
+    const texture = new Data3DTexture(new Uint8Array(4 * cells), nx, ny, nz);
+    texture.format = RGBAFormat;
+    texture.type = UnsignedByteType;
+    texture.minFilter = texture.magFilter = NearestFilter;
+    this.owners = texture;
+    this.uniforms.uOwners.value = texture;
+    this.paint(grid);
+  }
+
+  // The ground in the colours of the grid's owners: the grid of build(), when they have changed.
+  paint(grid: Grid): void {
+    if (!this.owners) return;
+    const data = this.owners.image.data as Uint8Array;
+    for (let c = 0; 4 * c < data.length; c++) {
       const colour = worldColour(grid.owner[c]!);
       data[4 * c] = colour >> 16;
       data[4 * c + 1] = (colour >> 8) & 255;
       data[4 * c + 2] = colour & 255;
       data[4 * c + 3] = 255;
     }
-    const texture = new Data3DTexture(data, nx, ny, nz);
-    texture.format = RGBAFormat;
-    texture.type = UnsignedByteType;
-    texture.minFilter = texture.magFilter = NearestFilter;
-    texture.needsUpdate = true;
-    this.owners = texture;
-    this.uniforms.uOwners.value = texture;
+    this.owners.needsUpdate = true;
   }
 
   private material(rgba: number): MeshLambertMaterial {

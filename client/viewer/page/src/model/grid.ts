@@ -1,5 +1,12 @@
-// The territory grid: which world owns which cell, and where its borders are.
-import type { Grid as GridMessage } from '../gen/viewer_pb';
+// The territory grid: which world owns which cell at the step that is shown, and where its borders are.
+import type { Grid as GridMessage, Transfer as TransferMessage } from '../gen/viewer_pb';
+
+// Cells that are the taker's from a step on.
+interface Transfer {
+  step: number;
+  taker: number;
+  cells: number[];
+}
 
 export interface BorderFace {
   axis: 0 | 1 | 2;
@@ -14,7 +21,11 @@ export class Grid {
   readonly origin: readonly [number, number, number];
   readonly edge: number;
   readonly size: readonly [number, number, number];
-  readonly owner: Uint16Array;
+  readonly owner: Uint16Array; // at the step of goTo()
+  private readonly initial: Uint16Array;
+  private readonly transfers: Transfer[] = []; // by step
+  private done = 0; // how many of them `owner` has
+  private stale = false; // some of a step that is shown have become known only since
 
   constructor(message: GridMessage | undefined) {
     const at = (k: number) => message?.origin[k] ?? 0;
@@ -25,6 +36,41 @@ export class Grid {
     const bytes = message?.owner ?? new Uint8Array(0);
     this.owner = new Uint16Array(bytes.slice().buffer as ArrayBuffer, 0, bytes.length >> 1);
     if (this.owner.length < this.size[0] * this.size[1] * this.size[2]) this.size = [0, 0, 0];
+    this.initial = this.owner.slice();
+  }
+
+  // Transfers that have become known, in any order; seen with the next goTo().
+  add(list: TransferMessage[]): void {
+    for (const { step, taker, cell } of list) {
+      const transfer = { step: Number(step), taker, cells: cell.filter((c) => c < this.owner.length) };
+      let at = this.transfers.length; // mostly the newest
+      while (at > 0 && this.transfers[at - 1]!.step > transfer.step) at--;
+      this.transfers.splice(at, 0, transfer);
+      if (at < this.done) this.stale = true;
+    }
+  }
+
+  // Makes `owner` that of this step, whether later or earlier than the one before; says whether that is another.
+  goTo(step: number): boolean {
+    const before = this.done;
+    const { stale } = this;
+    if (stale || (this.done > 0 && this.transfers[this.done - 1]!.step > step)) {
+      this.owner.set(this.initial);
+      this.done = 0;
+      this.stale = false;
+    }
+    for (; this.done < this.transfers.length && this.transfers[this.done]!.step <= step; this.done++) {
+      const { taker, cells } = this.transfers[this.done]!;
+      for (const cell of cells) this.owner[cell] = taker;
+    }
+    return stale || this.done !== before;
+  }
+
+  // How many cells each world owns.
+  cells(worlds: number): number[] {
+    const counts = new Array<number>(worlds).fill(0);
+    for (const w of this.owner) if (w < worlds) counts[w]!++;
+    return counts;
   }
 
   ownerAt(x: number, y: number, z: number): number {

@@ -1,9 +1,9 @@
 // What the gateway has told, and who wants to know of it. Nothing here draws.
 import { newTicks, type Ticks } from './ticks';
-import type { BodyList, Clocks, Ended, Frame, Rollback, ToPage, Welcome, WorldState } from '../gen/viewer_pb';
+import type { BodyList, Clocks, Ended, Frame, Rollback, ToPage, Transfer, Welcome, WorldState } from '../gen/viewer_pb';
 
 // Gateway and page are of one build; a page that a browser kept from another one says so instead of misreading.
-export const protocol = 2;
+export const protocol = 3;
 
 export interface RollbackRecord {
   world: number;
@@ -34,6 +34,7 @@ export interface WorldHistory {
 export interface SessionEvents {
   welcome(welcome: Welcome): void;
   bodies(list: BodyList): void;
+  transfers(list: Transfer[]): void;
   frame(frame: Frame): void;
   clocks(): void;
   worlds(): void;
@@ -76,6 +77,9 @@ export class Session {
         break;
       case 'bodies':
         this.events.bodies(what.value);
+        break;
+      case 'transfers':
+        this.events.transfers(what.value.transfer);
         break;
       case 'frame':
         this.events.frame(what.value);

@@ -3,6 +3,7 @@
 import { create } from '@bufbuild/protobuf';
 import { BoxGeometry, CapsuleGeometry, SphereGeometry, type BufferGeometry } from 'three';
 import { GridSchema, MeshSchema, StaticSchema, type Grid, type Mesh, type Static } from '../../src/gen/viewer_pb';
+import { Grid as Territories } from '../../src/model/grid';
 
 export type Kind = 'stack' | 'walker' | 'ball' | 'flyer';
 
@@ -25,8 +26,8 @@ export interface MockScene {
   statics: Static[];
   low: number[];
   high: number[];
-  grid: Grid;
-  owners: Uint16Array;
+  grid: Grid; // as pages are told it
+  territories: Territories;
 }
 
 // The same numbers for each run.
@@ -145,7 +146,7 @@ function finish(name: string, gravity: number, bodies: MockBody[], meshes: Mesh[
   const owners = new Uint16Array(size[0]! * size[1]! * size[2]!);
   bisect(origin, edge, size, [0, 0, 0], size, bodies.map((b) => b.start), 0, worlds, owners);
   const grid = create(GridSchema, { origin, edge, size, owner: bytesOf(owners) });
-  return { name, gravity, bodies, meshes, statics, low, high, grid, owners };
+  return { name, gravity, bodies, meshes, statics, low, high, grid, territories: new Territories(grid) };
 }
 
 // Cuts the cells from `from` to `to` across their longest side such that each part has its share of the places.

@@ -10,6 +10,7 @@ export const ahead = 28; // steps beyond the displayed one
 const width = 13; // position 3, quaternion 4, velocity 3, spin 3
 
 export interface State {
+  step: number;
   values: Float32Array;
   there: Uint8Array;
   asleep: Uint8Array;
@@ -47,7 +48,7 @@ export class Simulation {
     scene.bodies.forEach((body, i) => this.byId.set(body.id, i));
     this.kinds = scene.bodies.map((b) => b.kind);
     const n = scene.bodies.length;
-    const state: State = { values: new Float32Array(width * n), there: new Uint8Array(n).fill(1), asleep: new Uint8Array(n) };
+    const state: State = { step: 0, values: new Float32Array(width * n), there: new Uint8Array(n).fill(1), asleep: new Uint8Array(n) };
     scene.bodies.forEach((body, i) => {
       state.values.set(body.start, width * i);
       if (body.kind === 'stack') state.asleep[i] = 1;
@@ -73,7 +74,8 @@ export class Simulation {
     const cell = [0, 1, 2].map((c) =>
       Math.min(size[c]! - 1, Math.max(0, Math.floor((state.values[width * i + c]! + off[c]! - origin[c]!) / edge))),
     );
-    return this.scene.owners[cell[0]! + size[0]! * (cell[1]! + size[1]! * cell[2]!)]!;
+    this.scene.territories.goTo(state.step);
+    return this.scene.territories.ownerAt(cell[0]!, cell[1]!, cell[2]!);
   }
 
   flagsOf(state: State, i: number, owner: number): number {
@@ -140,7 +142,7 @@ export class Simulation {
         larger.set(a);
         return larger;
       };
-      this.states.set(step, { values: grow(old.values, width), there: grow(old.there, 1), asleep: grow(old.asleep, 1) });
+      this.states.set(step, { step, values: grow(old.values, width), there: grow(old.there, 1), asleep: grow(old.asleep, 1) });
     }
     return this.scene.bodies.length - 1;
   }
@@ -148,8 +150,8 @@ export class Simulation {
   private runTo(step: number): void {
     while (this.newest < step) {
       const before = this.states.get(this.newest)!;
-      const state: State = { values: before.values.slice(), there: before.there.slice(), asleep: before.asleep.slice() };
       this.newest++;
+      const state: State = { step: this.newest, values: before.values.slice(), there: before.there.slice(), asleep: before.asleep.slice() };
       for (let i = 0; i < state.there.length; i++) if (state.there[i] && !state.asleep[i]) this.move(state, i);
       this.apply(state, this.newest);
       this.states.set(this.newest, state);
