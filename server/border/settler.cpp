@@ -97,6 +97,29 @@ void Settler::find_threats(Step step) {
     }
 }
 
+bool Settler::is_worth_doing(Step step) {
+  if (context_.all_have_reached(step)) return true;
+  timeline::Timeline& timeline = context_.timeline;
+  const std::span<const timeline::Slot> pending = timeline.pending(step);
+  const auto known = deferred_.find(step);
+  if (known != deferred_.end() && known->second == pending.size()) return false;
+  find_threats(step);
+  for (const timeline::Slot slot : pending) {
+    const timeline::Record* const record = timeline.known(step, slot);
+    if (!record) continue;
+    if (timeline.own(*record)) {
+      const Aabb box = physics::reach_box(record->body, context_.model);
+      if (!must_wait({&box, 1})) return true;
+    } else {
+      for (const Link& link : context_.links)
+        if (link.reached(step) && timeline.heard(link.index(), step)->find(slot)) return true;
+    }
+  }
+  if (pending.empty()) return true;  // nothing moves: the step costs nothing
+  deferred_[step] = pending.size();
+  return false;
+}
+
 // ---- what others tell
 
 void Settler::part_came(const Link& from, Part part) {

@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -32,6 +33,11 @@ class Settler {
 
   // Where those may be at `step` for whom its islands must wait.
   void find_threats(Step step);
+
+  // Whether more would come of doing a step's pending bodies now than islands that must wait, to be found again when
+  // those have told their bodies for whom they wait.
+  bool is_worth_doing(Step step);
+  void reconsider() { deferred_.clear(); }  // something has come
 
   // ---- news
   void part_came(const Link& from, Part part);
@@ -78,6 +84,7 @@ class Settler {
   timeline::Marks threatening_;
   std::vector<std::pair<bool, Part>> later_parts_;  // for steps without an entry yet; whether direct
   std::vector<FinalPart> later_finals_;
+  std::map<Step, std::size_t> deferred_;  // steps that were not worth doing, with so many pending bodies
   std::vector<physics::Ends> ends_;
   physics::Islands islands_;
   std::vector<std::uint32_t> all_;

@@ -21,8 +21,8 @@ struct Transfer {
   bool operator==(const Transfer&) const = default;
 };
 
-// A transfer that a world tells at a final step is of so many steps later, so that whoever is within kHops neighbours of
-// it knows in time: see trade.h. `window`: K.
+// A transfer that a world tells at a final step is of so many steps later, so that whoever is within kHops neighbours
+// of it knows in time: see trade.h. `window`: K.
 constexpr Step kHops = 6;
 constexpr Step steps_to_transfer(Step window) { return window + kHops + 2; }
 

@@ -10,6 +10,7 @@
 #include "common/state_hash.h"
 #include "server/border/announcer.h"
 #include "server/border/context.h"
+#include "server/border/credible.h"
 #include "server/border/held_back.h"
 #include "server/border/link.h"
 #include "server/border/settler.h"
@@ -79,7 +80,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     changed();
     stats_.duplicates += link.duplicates() - before;
     settler_.finals_due(near_final + 1, link.near_final());
-    deferred_.clear();
+    settler_.reconsider();
     settler_.retry_all();
     finalise();
     return good;
@@ -106,7 +107,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     timeline_.act(action);
     ++logged_;
     ++stats_.actions;
-    deferred_.clear();
+    settler_.reconsider();
     changed();
     close();
     held_back_.release(logged_, [&](const auto& bytes) { (void)receive(bytes); });  // refusals are counted
@@ -157,7 +158,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     if (settings_.sync == Sync::kConservative) end = std::min(end, closed_);
     for (Step step = final_; step < end && step <= timeline_.newest(); ++step) {
       if (!may_process(step) || (step == timeline_.newest() && had_better_listen())) return false;
-      if ((timeline_.has_pending(step) || step == timeline_.newest()) && is_worth(step)) {
+      if ((timeline_.has_pending(step) || step == timeline_.newest()) && settler_.is_worth_doing(step)) {
         if (step == timeline_.newest() && !context_.all_have_reached(step)) ++stats_.anticipated;
         timeline_.process(step);
         settler_.retry_all();  // who waited for islands that were found anew may not need to any more
@@ -176,30 +177,6 @@ class WorldCore::Impl final : timeline::Arbiter {
     constexpr Step kNearly = 8;
     return settings_.window > 2 * kNearly && timeline_.newest() + kNearly >= final_ + settings_.window &&
            final_ < std::min(timeline_.newest(), closed_) && !links_.empty();
-  }
-
-  // Whether more would come of doing a step's pending bodies now than islands that must wait, to be found again when
-  // those have told their bodies for whom they wait.
-  bool is_worth(Step step) {
-    if (context_.all_have_reached(step)) return true;
-    const std::span<const timeline::Slot> pending = timeline_.pending(step);
-    const auto known = deferred_.find(step);
-    if (known != deferred_.end() && known->second == pending.size()) return false;
-    settler_.find_threats(step);
-    for (const timeline::Slot slot : pending) {
-      const timeline::Record* const record = timeline_.known(step, slot);
-      if (!record) continue;
-      if (timeline_.own(*record)) {
-        const Aabb box = physics::reach_box(record->body, model_);
-        if (!settler_.must_wait({&box, 1})) return true;
-      } else {
-        for (std::size_t source = 0; source < links_.size(); ++source)
-          if (links_[source].reached(step) && timeline_.heard(source, step)->find(slot)) return true;
-      }
-    }
-    if (pending.empty()) return true;  // nothing moves: the step costs nothing
-    deferred_[step] = pending.size();
-    return false;
   }
 
   bool may_process(Step step) const {
@@ -367,18 +344,6 @@ class WorldCore::Impl final : timeline::Arbiter {
     changed();
   }
 
-  void check_transfer(const Transfer& transfer) const {
-    const auto fail = [&](const std::string& why) {
-      throw CodecError("transfer " + std::to_string(transfer.number) + " of world " + std::to_string(transfer.giver) +
-                       ": " + why);
-    };
-    if (!settings_.balance) fail("cells do not change hands in this session");
-    if (const std::string why = territories_.fault(transfer); !why.empty()) fail(why);
-    if (transfer.number <= territories_.known(transfer.giver)) return;
-    if (transfer.giver == settings_.me) fail("is not of this world");
-    if (transfer.step <= timeline_.newest()) fail("comes too late");
-  }
-
   // ---- Arbiter
   timeline::Place place(const BodyState& body, Step step) const override { return neighbourhood_.place(body, step); }
   bool places_change(Step step) const override { return neighbourhood_.places_change(step); }
@@ -395,34 +360,16 @@ class WorldCore::Impl final : timeline::Arbiter {
   void keep(Step step, timeline::Found found) override { settler_.keep(step, std::move(found)); }
 
   void deliver(const Link& link, Message& message) {
-    // Final steps of neighbours differ by one at most, and nobody computes beyond its window.
-    const Step most_final = std::max(final_ + 1, link.since()), horizon = most_final + settings_.window + 1;
-    const auto bounded = [&](Step step, const char* what) {
-      if (step < 0 || step > horizon)
-        throw CodecError(std::string(what) + ": step " + std::to_string(step) + " cannot be");
-    };
-    const Header& h = message.header;
-    bounded(h.upto, "stream");
-    if (h.near_final < -1 || h.near_final > h.final_step || h.final_step > h.upto || h.final_step > most_final)
-      throw CodecError("stream: final steps " + std::to_string(h.final_step) + " and " + std::to_string(h.near_final) +
-                       " cannot be");
-    for (const Frame& frame : message.frames) {
-      bounded(frame.step, "frame");
-      if (frame.step <= link.final_step())
-        throw CodecError("frame: step " + std::to_string(frame.step) + " is final and cannot change");
-    }
-    for (const Part& part : message.parts) bounded(part.step, "part");
-    for (const FinalPart& part : message.finals) bounded(part.step, "final part");
-    if (!settings_.balance && !message.offers.empty()) throw CodecError("offer: cells do not change hands here");
+    check_steps(context_, link, message);
     for (const Transfer& transfer : message.transfers) {
-      check_transfer(transfer);
+      check_transfer(context_, territories_, transfer);
       learn(transfer, &link);  // before what rests on it
     }
 
     std::vector<Ref<timeline::NearSet>> sets;
     for (const Frame& frame : message.frames) {
       sets.push_back(timeline_.near_set(frame.set, frame.step));
-      for (const timeline::NearSet::Body& b : sets.back()->bodies) check_body(*b.record);
+      for (const timeline::NearSet::Body& b : sets.back()->bodies) check_body(context_, *b.record);
     }
     const std::size_t source = link.index();
     for (std::size_t i = 0; i < sets.size(); ++i) {
@@ -437,16 +384,6 @@ class WorldCore::Impl final : timeline::Arbiter {
     for (Offer& offer : message.offers) trade_.offered(link, std::move(offer));
     for (const Answer& answer : message.answers) trade_.answered(link, answer);
     if (message.load) loads_[link.peer()] = *message.load;
-  }
-
-  // What a neighbour may tell of: bodies of this world or of a neighbour, no faster than the scene lets them be.
-  void check_body(const timeline::Record& record) const {
-    const auto name = [&] { return "frame: body " + std::to_string(record.body.id); };  // for a refusal only
-    if (record.place.owner != settings_.me && !context_.link_to(record.place.owner))
-      throw CodecError(name() + " is of world " + std::to_string(record.place.owner) + ", which is no neighbour");
-    constexpr double kRounding = 1 + 1e-9;
-    if (!(record.body.v().norm() <= model_.scene().max_speed * kRounding))
-      throw CodecError(name() + " is faster than the scene's largest speed");
   }
 
   // ---- finality
@@ -496,10 +433,9 @@ class WorldCore::Impl final : timeline::Arbiter {
   std::vector<std::pair<Step, ActionNumber>> closings_;  // that presuppose entries of the log which have not come yet
   HeldBack held_back_;
   bool begun_ = false;
-  std::map<Step, std::size_t> deferred_;  // steps that were not worth doing, with so many pending bodies
-  bool idle_ = false;                     // nothing can be done before something comes
-  bool untold_ = true;                    // something has changed since it was last looked at what to tell
-  mutable std::optional<Step> front_;     // as long as nothing changes
+  bool idle_ = false;                  // nothing can be done before something comes
+  bool untold_ = true;                 // something has changed since it was last looked at what to tell
+  mutable std::optional<Step> front_;  // as long as nothing changes
   Neighbourhood neighbourhood_;
   std::deque<Link> links_;
   std::vector<WorldId> neighbours_;  // by link
