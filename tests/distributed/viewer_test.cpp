@@ -137,14 +137,13 @@ TEST_F(Viewer, TerritoriesAreThoseOfTheStepThatIsShown) {
   auto running = start(scene("city", 1000), 3, 100'000, {"--territories", path("hand.txtpb"), "--pace", "max"});
   serve();
   auto page = open(kWatching);
-  const auto shown = [](Page& page) {
-    return page.until(
-        [&] { return page.transfers.size() > 2 && misplaced(page, true) <= 20 && misplaced(page, false) > 100; });
+  const auto shown = [](Page& it) {
+    return it.until([&] { return it.transfers.size() > 2 && misplaced(it, true) <= 20 && misplaced(it, false) > 100; });
   };
-  const auto failure = [](const Page& page) {
-    return std::to_string(page.transfers.size()) + " transfers, " + std::to_string(page.bodies.size()) + " bodies, " +
-           std::to_string(misplaced(page, true)) + " misplaced, without transfers " +
-           std::to_string(misplaced(page, false)) + " at step " + std::to_string(page.frame.step());
+  const auto failure = [](const Page& it) {
+    return std::to_string(it.transfers.size()) + " transfers, " + std::to_string(it.bodies.size()) + " bodies, " +
+           std::to_string(misplaced(it, true)) + " misplaced, without transfers " +
+           std::to_string(misplaced(it, false)) + " at step " + std::to_string(it.frame.step());
   };
   EXPECT_TRUE(shown(*page)) << failure(*page);
   for (const view::Transfer& transfer : page->transfers) {
