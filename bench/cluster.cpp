@@ -69,8 +69,7 @@ Cluster::Cluster(const Scene& scene, const TerritoryMap& map, const border::Core
   for (WorldId w = 0; w < worlds(); ++w) {
     worlds_[w].core = make_core(w);
     if (settings.balance)
-      worlds_[w].balancer =
-          std::make_unique<balance::Balancer>(*worlds_[w].core, map_.grid, w, scene.dt, settings.window);
+      worlds_[w].balancer = std::make_unique<balance::Balancer>(*worlds_[w].core, map_.grid, w, scene.dt);
   }
 }
 

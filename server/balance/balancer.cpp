@@ -10,20 +10,23 @@ namespace {
 
 // What a body costs, against one that lies awake without contacts.
 constexpr double kPerContact = 0.5, kStill = 0.02;
-constexpr double kNewest = 0.5;  // weight of the newest measurement in the mean
-constexpr double kLate = 2;      // frames by which a world falls behind before it looks at its load
-constexpr int kMostOffers = 4;   // one after the other, before the next measurement
+constexpr double kNewest = 0.5;         // weight of the newest measurement in the mean
+constexpr double kLate = 2;             // frames by which a world falls behind before it looks at its load
+constexpr double kMostForesight = 1.5;  // s; who walks turns round, later on
+constexpr int kMostOffers = 4;          // one after the other, before the next measurement
 
 }  // namespace
 
-Balancer::Balancer(border::WorldCore& core, const Grid& grid, WorldId me, double dt, Step window)
+Balancer::Balancer(border::WorldCore& core, const Grid& grid, WorldId me, double dt)
     : core_(core),
       grid_(grid),
       me_(me),
-      foresight_(dt * (static_cast<double>(border::steps_to_transfer(window)) + 0.5 * static_cast<double>(kEvery))),
+      foresight_(std::min(kMostForesight,
+                          dt * (static_cast<double>(core.steps_to_transfer()) + 0.5 * static_cast<double>(kEvery)))),
       policy_([&] {
         Settings settings;
-        settings.transfer_steps = static_cast<double>(border::steps_to_transfer(window));
+        settings.transfer_steps = static_cast<double>(core.steps_to_transfer());
+        settings.keep = std::max(settings.keep, 2 * core.steps_to_transfer());
         return settings;
       }()),
       cost_(grid.cells(), 0) {}
@@ -70,7 +73,8 @@ void Balancer::measure(const Pace& pace) {
   for (const std::uint32_t cell : costly_)
     if (owners[cell] == me_) load_.expected += cost_[cell];
   std::erase_if(promises_, [&](const Promise& p) {
-    return std::all_of(p.cells.begin(), p.cells.end(), [&](std::uint32_t cell) { return core_.has_cell(cell); });
+    return std::all_of(p.cells.begin(), p.cells.end(),
+                       [&](std::uint32_t cell) { return core_.has_cell(cell) || owners[cell] != me_; });
   });
   for (const Promise& p : promises_) load_.expected += p.cost;
   for (const auto& [world, load] : core_.loads()) load_.expected += load.coming;
@@ -140,7 +144,8 @@ void Balancer::offer(const Pace& pace) {
   for (std::uint32_t cell = 0; cell < owners.size(); ++cell)
     if (owners[cell] == me_ && core_.may_give(cell)) mine_.push_back(cell);
   neighbours_.clear();
-  for (const auto& [world, load] : core_.loads()) neighbours_.push_back({world, load});
+  for (const auto& [world, load] : core_.loads())
+    if (core_.may_give_to(world)) neighbours_.push_back({world, load});
   const Situation situation{.grid = grid_,
                             .me = me_,
                             .now = now,

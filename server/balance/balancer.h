@@ -22,8 +22,8 @@ struct Pace {
 
 class Balancer {
  public:
-  // `core` and `grid` must outlive it. `dt`: of the scene, s; `window`: the session's K.
-  Balancer(border::WorldCore& core, const Grid& grid, WorldId me, double dt, Step window);
+  // `core` and `grid` must outlive it. `dt`: of the scene, s.
+  Balancer(border::WorldCore& core, const Grid& grid, WorldId me, double dt);
 
   // Work of the world, s of CPU time, since the last call.
   void worked(double seconds) { since_ += seconds; }
@@ -33,7 +33,7 @@ class Balancer {
 
   const Load& load() const { return load_; }
 
-  static constexpr Step kEvery = 15;
+  static constexpr Step kEvery = 10;
 
  private:
   void measure(const Pace& pace);

@@ -48,6 +48,9 @@ void check_transfer(const Context& context, const Territories& territories, cons
   if (transfer.number <= territories.known(transfer.giver)) return;
   if (transfer.giver == context.settings.me) fail("is not of this world");
   if (transfer.step <= context.timeline.newest()) fail("comes too late");
+  // Their giver's final step may be beyond this world's by as many steps as there are worlds between.
+  if (transfer.step > context.final_step + context.settings.window + 2 * static_cast<Step>(territories.worlds()) + 16)
+    fail("is of a step that nobody can have named");
 }
 
 }  // namespace soda::border

@@ -30,6 +30,8 @@ class Link {
   void add(Part part) { next_.parts.push_back(std::move(part)); }
   void add(FinalPart part) { next_.finals.push_back(part); }
   void add(Transfer transfer) { next_.transfers.push_back(std::move(transfer)); }
+  // Before anything has been sent: all of these, and no others.
+  void tell_all(const std::vector<Transfer>& transfers) { next_.transfers = transfers; }
   void add(Offer offer) { next_.offers.push_back(std::move(offer)); }
   void add(Answer answer) { next_.answers.push_back(answer); }
   void add(const Load& load) { next_.load = load; }  // with the next message, which it is no reason for

@@ -16,15 +16,23 @@ Neighbourhood::Neighbourhood(const physics::Model& model, const Territories& ter
       since_(territories.worlds(), kNever),
       half_edge_(0.5 * territories.grid().edge) {
   model_grew();
-  territories_change(-1);
+  territories_change(0);
 }
 
-void Neighbourhood::territories_change(Step now) {
+void Neighbourhood::territories_change(Step step) {
   for (Step& since : since_)
-    if (since > now) since = kNever;
-  territories_.find_neighbours(me_, range_, since_);
+    if (since >= step) since = kNever;
+  territories_.find_neighbours(me_, range_, step, since_);
   since_[me_] = kNever;
   alone_ = std::all_of(since_.begin(), since_.end(), [](Step since) { return since == kNever; });
+}
+
+Step Neighbourhood::hops() const {
+  if (hops_ < 0) {
+    const Step most = territories_.diameter(range_);
+    hops_ = std::max(most, std::min<Step>(2 * most, 6));
+  }
+  return hops_;
 }
 
 void Neighbourhood::model_grew() {

@@ -17,8 +17,12 @@ class Neighbourhood {
   // `model` and `territories` must outlive it.
   Neighbourhood(const physics::Model& model, const Territories& territories, WorldId me);
 
-  void model_grew();                  // a body has been added to the model
-  void territories_change(Step now);  // a transfer has become known, of a step after `now`
+  void model_grew();                   // a body has been added to the model
+  void territories_change(Step step);  // a transfer of that step has become known
+
+  // H: a transfer told at a final step F is of step F + K + H + 2 at least, so that all know it in time (trade.h).
+  // Found at the first call, which costs something.
+  Step hops() const;
 
   // From which step on a world has a cell so near to one of ours that a body can matter to both: within two cells, or
   // more where the scene's largest body, or its largest speed, reaches further. kNever: at none that is known of. What
@@ -52,6 +56,7 @@ class Neighbourhood {
   WorldId me_;
   std::vector<Step> since_;  // by world
   bool alone_ = true;        // no world is a neighbour, ever
+  mutable Step hops_ = -1;   // -1: not known yet
   double half_edge_ = 0;
   // By body: below this square of its speed, (m/s)^2, its reach box cannot leave half a cell, however it turns.
   std::vector<double> ordinary_below_;

@@ -77,6 +77,45 @@ bool Territories::keeps(WorldId world, std::size_t cell, Step step) const {
          });
 }
 
+Step Territories::diameter(int range) const {
+  // Who is near whom: for each cell, those further on along the axes; whose own neighbours are the others.
+  const std::vector<WorldId>& owner = versions_.front().owner;
+  std::vector<std::vector<std::uint8_t>> near(worlds_, std::vector<std::uint8_t>(worlds_, 0));
+  for (std::size_t i = 0; i < owner.size(); ++i) {
+    const auto n = static_cast<std::int32_t>(i);
+    const Cell c{n % grid_.size[0], n / grid_.size[0] % grid_.size[1], n / grid_.size[0] / grid_.size[1]};
+    Cell low = c, high = c;
+    for (int axis = 0; axis < 3; ++axis) high[axis] = std::min(c[axis] + range, grid_.size[axis] - 1);
+    for (int axis = 0; axis < 2; ++axis) low[axis] = std::max(c[axis] - range, 0);
+    for (std::int32_t z = c[2]; z <= high[2]; ++z)
+      for (std::int32_t y = low[1]; y <= high[1]; ++y)
+        for (std::int32_t x = low[0]; x <= high[0]; ++x) {
+          const WorldId other = owner[grid_.index({x, y, z})];
+          near[owner[i]][other] = near[other][owner[i]] = 1;
+        }
+  }
+  std::vector<std::vector<WorldId>> neighbours(worlds_);
+  for (WorldId a = 0; a < worlds_; ++a)
+    for (WorldId b = 0; b < worlds_; ++b)
+      if (near[a][b]) neighbours[a].push_back(b);
+  Step most = 0;
+  std::vector<Step> far(worlds_);
+  std::vector<WorldId> queue;
+  for (WorldId from = 0; from < worlds_; ++from) {
+    far.assign(worlds_, -1);
+    far[from] = 0;
+    queue.assign(1, from);
+    for (std::size_t at = 0; at < queue.size(); ++at)
+      for (const WorldId to : neighbours[queue[at]])
+        if (far[to] < 0) {
+          far[to] = far[queue[at]] + 1;
+          queue.push_back(to);
+        }
+    most = std::max(most, far[queue.back()]);
+  }
+  return most;
+}
+
 void Territories::release_before(Step step, Step memory) {
   while (versions_.size() > 1 && versions_[1].from <= step) versions_.erase(versions_.begin());
   std::erase_if(transfers_, [&](const Transfer& t) { return t.step < step - memory; });
@@ -130,10 +169,11 @@ std::size_t Territories::cells_of(WorldId world, Step step) const {
   return static_cast<std::size_t>(std::count(owner.begin(), owner.end(), world));
 }
 
-void Territories::find_neighbours(WorldId world, int range, std::vector<Step>& since) const {
+void Territories::find_neighbours(WorldId world, int range, Step from, std::vector<Step>& since) const {
   // Who gives cells away tells their new owner of what is in them, wherever else that one is.
   std::vector<std::uint8_t> near;
   for (std::size_t v = 0; v < versions_.size(); ++v) {
+    if (versions_[v].from < from) continue;
     const auto &now = versions_[v].owner, &before = versions_[v == 0 ? 0 : v - 1].owner;
     near.assign(grid_.cells(), 0);
     for (std::size_t i = 0; i < near.size(); ++i) near[i] = now[i] == world || before[i] == world;

@@ -21,11 +21,6 @@ struct Transfer {
   bool operator==(const Transfer&) const = default;
 };
 
-// A transfer that a world tells at a final step is of so many steps later, so that whoever is within kHops neighbours
-// of it knows in time: see trade.h. `window`: K.
-constexpr Step kHops = 6;
-constexpr Step steps_to_transfer(Step window) { return window + kHops + 2; }
-
 class Territories {
  public:
   explicit Territories(const TerritoryMap& initial);
@@ -56,8 +51,11 @@ class Territories {
   const std::vector<WorldId>& newest() const { return versions_.back().owner; }
 
   // Lowers since[w] to the first step that is known of at which w owns a cell within `range` cells of one that `world`
-  // owns then; or owned either at the step before.
-  void find_neighbours(WorldId world, int range, std::vector<Step>& since) const;
+  // owns then; or owned either at the step before. Looks at what holds from `from` on only.
+  void find_neighbours(WorldId world, int range, Step from, std::vector<Step>& since) const;
+
+  // The most neighbours from one world that has cells to another, by the initial territories; `range` as above.
+  Step diameter(int range) const;
 
   // Nothing is asked about steps before this one any more. Transfers are remembered for `memory` steps longer, for
   // worlds to whom somebody new may have to tell them.

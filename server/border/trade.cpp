@@ -1,6 +1,7 @@
 #include "server/border/trade.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 namespace soda::border {
@@ -9,13 +10,18 @@ bool Trade::may_give(std::size_t cell) const {
   return territories_.keeps(context_.settings.me, cell, context_.final_step);
 }
 
+bool Trade::may_give_to(WorldId taker) const {
+  const Link* const link = context_.link_to(taker);
+  return link && link->since() <= context_.final_step;
+}
+
 bool Trade::offer(WorldId taker, std::vector<std::uint32_t> cells, double cost) {
-  Link* const link = context_.link_to(taker);
-  if (!link || link->since() > context_.final_step || offered_ || cells.empty()) return false;
+  if (!may_give_to(taker) || offered_ || cells.empty()) return false;
+  if (context_.final_step + steps_to_transfer() > context_.settings.last_step) return false;
   if (std::adjacent_find(cells.begin(), cells.end(), std::greater_equal()) != cells.end()) return false;
   for (const std::uint32_t cell : cells)
     if (cell >= territories_.grid().cells() || !may_give(cell)) return false;
-  link->add(Offer{++offers_, cost, cells});
+  context_.link_to(taker)->add(Offer{++offers_, cost, cells});
   offered_ = Offered{taker, offers_, std::move(cells)};
   ++context_.stats.offers;
   return true;
@@ -34,13 +40,20 @@ void Trade::answered(const Link& from, const Answer& answer) {
 std::optional<Transfer> Trade::agreed() {
   if (!offered_ || !offered_->accepted) return std::nullopt;
   const WorldId me = context_.settings.me;
-  Transfer transfer{me, territories_.known(me) + 1, context_.final_step + steps_to_transfer(context_.settings.window),
-                    offered_->taker, std::move(offered_->cells)};
+  Transfer transfer{me, territories_.known(me) + 1, context_.final_step + steps_to_transfer(), offered_->taker,
+                    std::move(offered_->cells)};
   offered_.reset();
   return transfer;
 }
 
-void Trade::offered(const Link& from, Offer offer) { asked_.push_back({from.peer(), std::move(offer)}); }
+void Trade::offered(const Link& from, Offer offer) {
+  // Whoever gave it those that it has, told of that first.
+  for (const std::uint32_t cell : offer.cells)
+    if (cell >= territories_.grid().cells() || territories_.newest()[cell] != from.peer())
+      throw CodecError("offer: cell " + std::to_string(cell) + " is not world " + std::to_string(from.peer()) + "'s");
+  std::erase_if(asked_, [&](const Asked& asked) { return asked.giver == from.peer(); });
+  asked_.push_back({from.peer(), std::move(offer)});
+}
 
 void Trade::answer(const Asked& asked, bool accept) {
   Link* const link = context_.link_to(asked.giver);

@@ -6,14 +6,13 @@
 // only when it has heard that its neighbours' states t are, and in a stream the transfer comes before whatever becomes
 // final after it. So a world h neighbours away knows it before its own final step is beyond F + h, with F the giver's
 // when it was told, and before its clock, which is at most K beyond that, is beyond F + h + K. With
-//   T = F + K + kHops + 2  (steps_to_transfer)
-// whoever is within kHops has not computed state T yet. Those are all to whom it matters: a world asks only whom cells
-// within five of its own, or its neighbours', belong to (three hops at most, since worlds within two cells are
-// neighbours), and who has just taken such cells had them from a neighbour (one more). The longest chain of takers
-// grows by a hop in no less than K steps, while news travel a hop a step: they are never overtaken.
+//   T = F + K + H + 2,   H the most neighbours from any world to any other (Neighbourhood::hops)
+// nobody has computed state T yet. Links are never given up, so that H, by the initial territories, stays a bound.
 //
 // The same holds for worlds that become neighbours at T: when one of them, having reached T, first speaks to the other,
-// that one knows of it.
+// that one's final step is at least F + H + 2 - d, with d neighbours between the two, and it knows the transfer from
+// F + h + 1 on. All three are near the same cells, so that d + h is at most 7; with H at least 6 or, where that is
+// less, twice the most neighbours between any two, it is at most H + 1.
 //
 // News of two transfers of which one rests on the other cannot come in the wrong order: who made the second knew the
 // first, and told it first.
@@ -37,8 +36,12 @@ class Trade {
   // ---- to give
   // Whether this world has the cell, and keeps it, by all that is known.
   bool may_give(std::size_t cell) const;
+  // Whether a world is a neighbour at the final step.
+  bool may_give_to(WorldId taker) const;
+  // How much later than the final step a transfer is that is told now.
+  Step steps_to_transfer() const { return context_.settings.window + context_.neighbourhood.hops() + 2; }
   // Offers cells, ascending, to a neighbour. False, and nothing has happened: some may not be given, `taker` is no
-  // neighbour yet, or something is being given already.
+  // neighbour yet, something is being offered already, or the run ends before.
   bool offer(WorldId taker, std::vector<std::uint32_t> cells, double cost);
   // Something has been offered, and is not a transfer yet. (Several transfers may be on their way.)
   bool offering() const { return offered_.has_value(); }
@@ -47,6 +50,7 @@ class Trade {
   std::optional<Transfer> agreed();
 
   // ---- to take
+  // Throws CodecError for cells that are not the giver's. Of one giver the newest offer counts.
   void offered(const Link& from, Offer offer);
   std::vector<Asked> take_offers() { return std::exchange(asked_, {}); }
   void answer(const Asked& asked, bool accept);

@@ -319,27 +319,31 @@ class WorldCore::Impl final : timeline::Arbiter {
     return links;
   }
 
+  Link& open_link(WorldId world) {
+    Link& link = links_.emplace_back(make_link(world, links_.size()));
+    neighbours_.push_back(world);
+    timeline_.add_source();
+    announcer_.add_link(timeline_.newest());
+    settler_.add_link();
+    ++stats_.links_opened;
+    return link;
+  }
+
   // ---- cells that change hands
   void learn(const Transfer& transfer, const Link* from) {
     if (!territories_.add(transfer)) return;
     trade_.learnt(transfer);
     learnt_.push_back(transfer);
     for (Link& link : links_)
-      if (&link != from) link.add(transfer);
-    neighbourhood_.territories_change(final_);
+      if (&link != from && link.since() != Neighbourhood::kNever) link.add(transfer);
+    neighbourhood_.territories_change(transfer.step);
     for (WorldId world = 0; world < territories_.worlds(); ++world) {
       const Step since = neighbourhood_.neighbour_since(world);
-      if (Link* const link = context_.link_to(world)) {
-        link->set_since(since);
-      } else if (since != Neighbourhood::kNever) {
-        Link& opened = links_.emplace_back(make_link(world, links_.size()));
-        neighbours_.push_back(world);
-        for (const Transfer& known : territories_.transfers()) opened.add(known);
-        timeline_.add_source();
-        announcer_.add_link(timeline_.newest());
-        settler_.add_link();
-        ++stats_.links_opened;
-      }
+      Link* link = context_.link_to(world);
+      const bool begins = since != Neighbourhood::kNever && (!link || link->since() == Neighbourhood::kNever);
+      if (begins && !link) link = &open_link(world);
+      if (link) link->set_since(since);
+      if (begins) link->tell_all(territories_.transfers());
     }
     changed();
   }
@@ -360,6 +364,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   void keep(Step step, timeline::Found found) override { settler_.keep(step, std::move(found)); }
 
   void deliver(const Link& link, Message& message) {
+    if (link.since() == Neighbourhood::kNever) throw CodecError("border message of what is no neighbour any more");
     check_steps(context_, link, message);
     for (const Transfer& transfer : message.transfers) {
       check_transfer(context_, territories_, transfer);
@@ -411,7 +416,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     timeline_.release_before(keep);
     announcer_.release_before(keep);
     settler_.release_before(keep);
-    territories_.release_before(keep, 8 * steps_to_transfer(settings_.window));
+    if (settings_.balance) territories_.release_before(keep, 8 * trade_.steps_to_transfer());
   }
 
   void count(Step step) {
@@ -461,9 +466,11 @@ void WorldCore::set_limit(Step newest) { impl_->set_limit(newest); }
 bool WorldCore::give(WorldId taker, std::vector<std::uint32_t> cells, double cost) {
   return impl_->settings_.balance && impl_->trade_.offer(taker, std::move(cells), cost);
 }
+bool WorldCore::may_give_to(WorldId taker) const { return impl_->trade_.may_give_to(taker); }
+Step WorldCore::steps_to_transfer() const { return impl_->trade_.steps_to_transfer(); }
 bool WorldCore::offering() const { return impl_->trade_.offering(); }
 bool WorldCore::has_cell(std::size_t cell) const {
-  return impl_->territories_.owner(cell, clock()) == impl_->settings_.me;
+  return impl_->territories_.owner(cell, front()) == impl_->settings_.me;
 }
 bool WorldCore::may_give(std::size_t cell) const { return impl_->trade_.may_give(cell); }
 std::vector<Asked> WorldCore::take_offers() { return impl_->trade_.take_offers(); }

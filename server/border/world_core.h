@@ -113,7 +113,7 @@ class WorldCore {
   // ---- in
   // A message as it came, from whichever neighbour, in any order, any number of times. False: it was refused
   // (malformed, not for this world or epoch, or contrary to the protocol); last_refusal() says why, and nothing has
-  // changed.
+  // changed (but for transfers that have been said along with what was refused).
   bool receive(std::span<const std::byte> message);
   const std::string& last_refusal() const;
   // The connection with that neighbour was interrupted, or nothing has come for long: asks it for what is missing here
@@ -135,7 +135,9 @@ class WorldCore {
   bool give(WorldId taker, std::vector<std::uint32_t> cells, double cost = 0);
   bool offering() const;  // an offer has not become a transfer, or been declined, yet
   bool may_give(std::size_t cell) const;
-  bool has_cell(std::size_t cell) const;  // at the clock
+  bool may_give_to(WorldId taker) const;
+  bool has_cell(std::size_t cell) const;  // at the front
+  Step steps_to_transfer() const;         // from the final step to when cells that are offered now would change hands
   // What neighbours would like to give since the last call, each to be answered.
   std::vector<Asked> take_offers();
   void answer(const Asked& asked, bool accept);

@@ -169,8 +169,9 @@ Choice Chooser::choose(const IslandView& island) {
   std::uint32_t stiffness = level_for(wanted);
   if (had > stiffness) stiffness = wanted < kSofterBelow * static_cast<double>(1u << had) ? had - 1 : had;
   // Where many bodies share each level, contacts do well that are twice as stiff for their sub-steps; a stack would
-  // begin to sway.
-  const bool broad = static_cast<double>(island.bodies.size()) > kBroadIsland * deepest_;
+  // begin to sway, and so does what is heavy on what is light, which is why it wants more.
+  const bool broad = deepest_ > 0 && static_cast<double>(island.bodies.size()) > kBroadIsland * deepest_ &&
+                     stiffness <= kMostBroadStiffness;
   const std::uint32_t least = broad && stiffness > kLeastSubstepLevel ? stiffness - 1 : stiffness;
   return {1u << std::max(least, level_for(motion_wanted(island))), stiffness};
 }

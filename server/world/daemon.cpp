@@ -69,7 +69,7 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
   if (settings.balance && settings.worlds > 1)
-    balancer_.emplace(*core_, map_.grid, settings.me, model_.scene().dt, settings.window);
+    balancer_.emplace(*core_, map_.grid, settings.me, model_.scene().dt);
   lines_.resize(settings.worlds);
   open_lines();
 }

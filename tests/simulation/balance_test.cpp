@@ -59,7 +59,7 @@ class Lockstep {
           *models_[w], map_,
           border::CoreSettings{.me = w, .epoch = 1, .session = 9, .last_step = steps, .balance = balance},
           digests_[w]));
-      balancers_.push_back(std::make_unique<balance::Balancer>(*cores_[w], map_.grid, w, scene.dt, 48));
+      balancers_.push_back(std::make_unique<balance::Balancer>(*cores_[w], map_.grid, w, scene.dt));
     }
     computed_.resize(worlds);
   }

@@ -110,13 +110,22 @@ TEST_F(Messages, OfTransfersThatCannotBeAreRefused) {
     return world.last_refusal();
   };
   const std::uint32_t mine = owned_by(0), its = owned_by(1);
-  EXPECT_NE(refusal({1, 1, 100, 0, {mine}}).find("is not its giver's"), std::string::npos);
-  EXPECT_NE(refusal({1, 2, 100, 0, {its}}).find("others of its giver"), std::string::npos);
+  EXPECT_NE(refusal({1, 1, 60, 0, {mine}}).find("is not its giver's"), std::string::npos);
+  EXPECT_NE(refusal({1, 2, 60, 0, {its}}).find("others of its giver"), std::string::npos);
   EXPECT_NE(refusal({1, 1, 0, 0, {its}}).find("past"), std::string::npos);
-  EXPECT_NE(refusal({1, 1, 100, 7, {its}}).find("such worlds"), std::string::npos);
-  EXPECT_NE(refusal({1, 1, 100, 0, {99999}}).find("no cell 99999"), std::string::npos);
-  EXPECT_NE(refusal({0, 1, 100, 1, {mine}}).find("is not of this world"), std::string::npos);
-  message.transfers = {{1, 1, 100, 0, {its}}};
+  EXPECT_NE(refusal({1, 1, 60, 7, {its}}).find("such worlds"), std::string::npos);
+  EXPECT_NE(refusal({1, 1, 60, 0, {99999}}).find("no cell 99999"), std::string::npos);
+  EXPECT_NE(refusal({0, 1, 60, 1, {mine}}).find("is not of this world"), std::string::npos);
+  EXPECT_NE(refusal({1, 1, 5000, 0, {its}}).find("nobody can have named"), std::string::npos);
+  message.transfers.clear();
+  for (const std::uint32_t cell : {mine, 4000000000u}) {
+    message.offers = {{1, 0, {cell}}};
+    EXPECT_FALSE(world.receive(border::encode(message)));
+    EXPECT_NE(world.last_refusal().find("is not world 1's"), std::string::npos) << world.last_refusal();
+  }
+  message.offers.clear();
+  EXPECT_TRUE(world.take_offers().empty());
+  message.transfers = {{1, 1, 60, 0, {its}}};
   EXPECT_TRUE(world.receive(border::encode(message))) << world.last_refusal();
   EXPECT_EQ(world.owners_ahead()[its], 0u);
   EXPECT_EQ(world.take_transfers().size(), 1u);

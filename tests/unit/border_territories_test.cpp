@@ -72,7 +72,7 @@ TEST(Territories, NeighboursAreSinceTheStepAtWhichCellsAreNear) {
   Territories t(row());
   const auto since = [&](int range) {
     std::vector<Step> of(3, kNever);
-    t.find_neighbours(2, range, of);
+    t.find_neighbours(2, range, 0, of);
     return of;
   };
   EXPECT_EQ(since(1), (std::vector<Step>{kNever, kNever, kNever}));
@@ -80,6 +80,17 @@ TEST(Territories, NeighboursAreSinceTheStepAtWhichCellsAreNear) {
   t.add({0, 1, 9, 2, {0}});
   EXPECT_EQ(since(1), (std::vector<Step>{9, 5, 5}));
   EXPECT_EQ(since(3), (std::vector<Step>{5, 5, 5}));
+}
+
+TEST(Territories, KnowHowManyNeighboursLieBetween) {
+  Grid grid;
+  grid.size = {9, 1, 1};
+  const Territories three({grid, 4, {0, 0, 0, 1, 1, 1, 2, 2, 2}});  // the fourth has nothing
+  EXPECT_EQ(three.diameter(2), 2);
+  EXPECT_EQ(three.diameter(4), 1);
+  const Territories nine({grid, 9, {0, 1, 2, 3, 4, 5, 6, 7, 8}});
+  EXPECT_EQ(nine.diameter(2), 4);
+  EXPECT_EQ(Territories({grid, 1, std::vector<WorldId>(9, 0)}).diameter(2), 0);
 }
 
 TEST(Territories, ForgetWhatIsPast) {
