@@ -141,6 +141,35 @@ TEST_P(Given, SameBitsAsOneWorld) {
 
 INSTANTIATE_TEST_SUITE_P(Sample, Given, testing::ValuesIn(scene_names()), [](const auto& one) { return one.param; });
 
+// News of a transfer must have gone all the way along a row of worlds before anybody there computes its step, the one
+// furthest ahead, too. (Once a world eight neighbours away was ahead of them, and refused them for ever.)
+TEST(Given, AlongRowsOfWorlds) {
+  std::uint64_t transfers = 0, rows = 0;
+  for (const std::string& name : scene_names()) {
+    const Reference& expected = reference(name);
+    const std::vector<WorldId> owner = slabs(expected.scene, 10);
+    if (owner.empty()) continue;
+    ++rows;
+    for (const Step window : {1, 2, 8}) {
+      NetworkSettings network;
+      network.seed = static_cast<std::uint64_t>(window);
+      network.window = window;
+      network.lead = 200;
+      network.stall_share = 0.9;
+      network.give_share = 0.02;
+      const Step steps = std::min<Step>(hard_scene(name).steps, 60);
+      const SessionResult got = run_session(expected.scene, 10, steps, network, owner);
+      ASSERT_EQ(got.failure, "") << name;
+      EXPECT_EQ(got.total.refused, 0u);
+      const auto begin = expected.steps.begin();
+      EXPECT_EQ(first_difference({begin, begin + steps + 1}, got.steps), "") << name;
+      transfers += got.total.transfers;
+    }
+  }
+  EXPECT_GT(rows, 0u);
+  EXPECT_GT(transfers, 20u);
+}
+
 TEST(WideBodies, AreToldToEveryWorldTheyReach) {
   const Reference& expected = reference("wide_bodies");
   const SessionResult got = run_session(expected.scene, 8, 150, {});
