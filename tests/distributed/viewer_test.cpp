@@ -322,11 +322,12 @@ TEST_F(Viewer, MayBeThereBeforeTheSessionAndSeesAWorldDie) {
 TEST_F(Viewer, ShowsTheNextSessionOfItsName) {
   serve();
   auto page = open();
-  auto first = start(scene("cubes", 60), 2, 60);
+  auto first = start(scene("cubes", 60), 2, 100'000);  // for as long as it takes to be found
   ASSERT_TRUE(page->until([&] { return page->bodies.size() == 60; }));
   page->look(-5);
+  first->signal(SIGINT);
   ASSERT_TRUE(page->until([&] { return !page->ended.empty(); }, 60s));
-  expect_exit(*first, 0);
+  expect_exit(*first, 128 + SIGINT);
   auto second = start(scene("city", 300), 3, 100'000);
   ASSERT_TRUE(shows(*page, 300)) << page->bodies.size() << gateway().output();
   EXPECT_EQ(page->ended, "");
