@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bench/clocks.h"
 #include "bench/harness.h"
+#include "common/cpu_clock.h"
 #include "common/scene/generators.h"
 
 namespace soda::bench {

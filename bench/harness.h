@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "bench/clocks.h"
+#include "common/cpu_clock.h"
 
 namespace soda::bench {
 

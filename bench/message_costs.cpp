@@ -17,8 +17,8 @@
 #include <thread>
 #include <vector>
 
-#include "bench/clocks.h"
 #include "bench/harness.h"
+#include "common/cpu_clock.h"
 #include "server/world/dds_transport.h"
 
 namespace soda::bench {

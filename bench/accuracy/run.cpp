@@ -4,7 +4,7 @@
 
 #include "bench/accuracy/accuracy.h"
 #include "bench/bullet_world.h"
-#include "bench/clocks.h"
+#include "common/cpu_clock.h"
 #include "server/physics/stepper.h"
 
 namespace soda::bench {

@@ -75,7 +75,7 @@ Topic transforms_topic() {
 }
 
 // Who comes later needs them all to know who owns what; a crowd that walks makes about one per second and world, of
-// some dozens of cells. A write does not wait for viewers.
+// some dozens of cells. The newest push out the oldest, so that a write does not wait for viewers.
 Topic transfers_topic() {
   Topic topic{"soda/transfers", newest(kManyWorlds)};
   topic.flow.keep_last = kTransfersKept;

@@ -72,11 +72,11 @@ void Balancer::measure(const Pace& pace) {
   load_.expected = 0;
   for (const std::uint32_t cell : costly_)
     if (owners[cell] == me_) load_.expected += cost_[cell];
-  std::erase_if(promises_, [&](const Promise& p) {
+  std::erase_if(promises_, [&](const border::Offer& p) {
     return std::all_of(p.cells.begin(), p.cells.end(),
                        [&](std::uint32_t cell) { return core_.has_cell(cell) || owners[cell] != me_; });
   });
-  for (const Promise& p : promises_) load_.expected += p.cost;
+  for (const border::Offer& p : promises_) load_.expected += p.cost;
   for (const auto& [world, load] : core_.loads()) load_.expected += load.coming;
   const double ahead = static_cast<double>(std::max<Step>(0, now - pace.displayed));
   load_.on_time = pace.budget > 0 ? steps_on_time(ahead, pace.budget, load_.work) : 0;
@@ -119,7 +119,7 @@ void Balancer::answer_offers() {
                         may_take(grid_, core_.owners_ahead(), me_, offer.cells, offer.cost, load_, giver->second);
     core_.answer(asked, accept);
     if (!accept) continue;
-    promises_.push_back({offer.cells, offer.cost});
+    promises_.push_back(offer);
     load_.expected += offer.cost;
     policy_.took(core_.clock(), asked.giver, offer.cells);
   }

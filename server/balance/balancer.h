@@ -60,13 +60,9 @@ class Balancer {
   std::vector<std::uint32_t> mine_;
   std::vector<Neighbour> neighbours_;
   std::optional<Proposal> proposed_;
-  int offers_ = 0;              // since the last measurement
-  std::uint64_t declined_ = 0;  // of its offers, by the core's count
-  struct Promise {
-    std::vector<std::uint32_t> cells;
-    double cost;  // s per step
-  };
-  std::vector<Promise> promises_;  // accepted cells that are not this world's yet
+  int offers_ = 0;                       // since the last measurement
+  std::uint64_t declined_ = 0;           // of its offers, by the core's count
+  std::vector<border::Offer> promises_;  // accepted cells that are not this world's yet
 };
 
 }  // namespace soda::balance

@@ -6,6 +6,7 @@
 namespace soda::border {
 
 void check_steps(const Context& context, const Link& link, const Message& message) {
+  if (link.since() == Neighbourhood::kNever) throw CodecError("border message of what is no neighbour any more");
   // Final steps of neighbours differ by one at most, and nobody computes beyond its window.
   const Step most_final = std::max(context.final_step + 1, link.since());
   const Step horizon = most_final + context.settings.window + 1;

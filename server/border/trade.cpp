@@ -21,14 +21,14 @@ bool Trade::offer(WorldId taker, std::vector<std::uint32_t> cells, double cost) 
   if (std::adjacent_find(cells.begin(), cells.end(), std::greater_equal()) != cells.end()) return false;
   for (const std::uint32_t cell : cells)
     if (cell >= territories_.grid().cells() || !may_give(cell)) return false;
-  context_.link_to(taker)->add(Offer{++offers_, cost, cells});
-  offered_ = Offered{taker, offers_, std::move(cells)};
+  offered_ = Offered{taker, {++offers_, cost, std::move(cells)}};
+  context_.link_to(taker)->add(offered_->offer);
   ++context_.stats.offers;
   return true;
 }
 
 void Trade::answered(const Link& from, const Answer& answer) {
-  if (!offered_ || offered_->taker != from.peer() || offered_->number != answer.number) return;  // said again
+  if (!offered_ || offered_->taker != from.peer() || offered_->offer.number != answer.number) return;  // said again
   if (answer.accepted) {
     offered_->accepted = true;
   } else {
@@ -41,7 +41,7 @@ std::optional<Transfer> Trade::agreed() {
   if (!offered_ || !offered_->accepted) return std::nullopt;
   const WorldId me = context_.settings.me;
   Transfer transfer{me, territories_.known(me) + 1, context_.final_step + steps_to_transfer(), offered_->taker,
-                    std::move(offered_->cells)};
+                    std::move(offered_->offer.cells)};
   offered_.reset();
   return transfer;
 }

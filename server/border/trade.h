@@ -63,8 +63,7 @@ class Trade {
  private:
   struct Offered {
     WorldId taker = 0;
-    std::uint32_t number = 0;
-    std::vector<std::uint32_t> cells;
+    Offer offer;
     bool accepted = false;
   };
   const Context& context_;

@@ -364,22 +364,19 @@ class WorldCore::Impl final : timeline::Arbiter {
   void keep(Step step, timeline::Found found) override { settler_.keep(step, std::move(found)); }
 
   void deliver(const Link& link, Message& message) {
-    if (link.since() == Neighbourhood::kNever) throw CodecError("border message of what is no neighbour any more");
     check_steps(context_, link, message);
     for (const Transfer& transfer : message.transfers) {
       check_transfer(context_, territories_, transfer);
       learn(transfer, &link);  // before what rests on it
     }
-
     std::vector<Ref<timeline::NearSet>> sets;
     for (const Frame& frame : message.frames) {
       sets.push_back(timeline_.near_set(frame.set, frame.step));
       for (const timeline::NearSet::Body& b : sets.back()->bodies) check_body(context_, *b.record);
     }
-    const std::size_t source = link.index();
     for (std::size_t i = 0; i < sets.size(); ++i) {
       const Frame& frame = message.frames[i];
-      timeline_.hear(source, frame.step, std::move(sets[i]));
+      timeline_.hear(link.index(), frame.step, std::move(sets[i]));
       // What was told of one step says something of those after it.
       for (Step step = std::max(frame.step, timeline_.oldest()); step <= timeline_.newest(); ++step)
         settler_.part_due(step);

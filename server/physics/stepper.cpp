@@ -3,21 +3,15 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
 
+#include "common/cpu_clock.h"
 #include "server/physics/tuning.h"
 
 namespace soda::physics {
 namespace {
-
-double cpu_seconds() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 class StageClock {
  public:

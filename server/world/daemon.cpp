@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <ctime>
 #include <utility>
 
 #include "common/actions/action_proto.h"
+#include "common/cpu_clock.h"
 #include "common/grid.h"
 
 namespace soda::world {
@@ -31,13 +31,6 @@ constexpr auto kFinishAtMost = 10s;
 
 double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
 double seconds(const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); }
-
-// Of the calling thread.
-double thread_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 std::string host_name() {
   char name[256] = {};
@@ -68,8 +61,7 @@ Daemon::Daemon(Scene scene, const DaemonSettings& settings, Transport& transport
   core.balance = settings.balance;
   core_ = std::make_unique<border::WorldCore>(model_, map_, core, recorder_);
   core_->set_limit(0);
-  if (settings.balance && settings.worlds > 1)
-    balancer_.emplace(*core_, map_.grid, settings.me, model_.scene().dt);
+  if (settings.balance && settings.worlds > 1) balancer_.emplace(*core_, map_.grid, settings.me, model_.scene().dt);
   lines_.resize(settings.worlds);
   open_lines();
 }
@@ -321,7 +313,7 @@ Daemon::End Daemon::run() {
   report_status(wire::STATE_PREPARING, Clock::now());
   while (!stopped_.load()) {
     const auto before = Clock::now();
-    const double cpu_before = thread_cpu_seconds();
+    const double cpu_before = cpu_seconds();
     receive_all();
     open_lines();
     act_all();
@@ -346,7 +338,7 @@ Daemon::End Daemon::run() {
     }
     const auto now = Clock::now();
     working_ += now - before;
-    if (balancer_) balancer_->worked(thread_cpu_seconds() - cpu_before);
+    if (balancer_) balancer_->worked(cpu_seconds() - cpu_before);
     report_if_due(now);
     const bool told = feed_.report(*core_, progress != Progress::kWorked, now);
     if (state_ == wire::STATE_PREPARING && transport_.connected() && reports_.listened_to())
