@@ -210,6 +210,7 @@ class SceneReader {
     body.angular_damping = message.angular_damping();
     if (message.has_drive()) body.drive = read_drive(message.drive());
     if (message.has_motion()) body.motion = read_motion(message.motion());
+    body.fixed_rotation = message.fixed_rotation();
 
     double density = kDefaultDensity;
     if (!message.material().empty()) {
@@ -429,6 +430,7 @@ pb::Scene to_proto(const Scene& scene) {
     inertia->set_xx(i(0, 0)), inertia->set_yy(i(1, 1)), inertia->set_zz(i(2, 2));
     inertia->set_xy(i(0, 1)), inertia->set_xz(i(0, 2)), inertia->set_yz(i(1, 2));
     if (body.motion) write_motion(*body.motion, out->mutable_motion());
+    out->set_fixed_rotation(body.fixed_rotation);
     if (!body.drive) continue;
     write_vec3(body.drive->velocity, out->mutable_drive()->mutable_velocity());
     out->mutable_drive()->set_max_acceleration(body.drive->max_acceleration);

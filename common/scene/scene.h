@@ -95,6 +95,7 @@ struct Body {
   double linear_damping = 0, angular_damping = 0;  // 1/s
   std::optional<Drive> drive;                      // dynamic bodies only
   std::optional<PrescribedMotion> motion;          // likewise; then nothing else moves it
+  bool fixed_rotation = false;                     // likewise, without motion: nothing ever turns it
   double joint_reach = 0;  // m, about the centre of mass, within which its joints act; filled in from them
   // Two bodies collide where each one's groups have a bit in the other's mask.
   std::uint32_t collision_groups = 1, collision_mask = 0xffffffff;

@@ -182,6 +182,7 @@ MaybeProblem motion_problem(const Body& body, double max_speed) {
   if (body.drive) return Problem{"drive", "a body that follows a motion has none"};
   if (body.linear_velocity != Vec3::Zero()) return Problem{"linear_velocity", "the body's motion says it"};
   if (body.angular_velocity != Vec3::Zero()) return Problem{"angular_velocity", "the body's motion says it"};
+  if (body.fixed_rotation) return Problem{"fixed_rotation", "the body's motion says how it turns"};
   if (auto p = coordinates("motion.velocity", motion.velocity)) return p;
   if (auto p = coordinates("motion.amplitude", motion.amplitude)) return p;
   if (auto p = in_range("motion.frequency", motion.frequency, 0, kMaxFrequency, " Hz")) return p;
@@ -245,9 +246,12 @@ MaybeProblem body_problem(const Scene& scene, const Body& body) {
   if (!body.is_static) {
     if (auto p = inertial_problem(body.inertial)) return p;
     if (body.motion) return motion_problem(body, scene.max_speed);
+    if (body.fixed_rotation && body.angular_velocity != Vec3::Zero())
+      return Problem{"angular_velocity", "the body has a fixed_rotation"};
     return body.drive ? drive_problem(*body.drive, scene.max_speed) : std::nullopt;
   }
   if (body.motion) return Problem{"motion", "a static body does not move"};
+  if (body.fixed_rotation) return Problem{"fixed_rotation", "a static body does not move"};
   if (body.drive) return Problem{"drive", "a static body does not move"};
   if (body.linear_velocity != Vec3::Zero()) return Problem{"linear_velocity", "a static body does not move"};
   if (body.angular_velocity != Vec3::Zero()) return Problem{"angular_velocity", "a static body does not move"};

@@ -46,6 +46,8 @@ MaybeProblem spring_problem(const std::string& field, const JointSpring& spring)
   return in_range(field + ".damping_ratio", spring.damping_ratio, 0, kMaxDampingRatio);
 }
 
+bool can_turn(const Body& body) { return !body.is_static && !body.motion && !body.fixed_rotation; }
+
 MaybeProblem ends_problem(const Scene& scene, const Joint& joint) {
   const Body* const a = find_body(scene, joint.a);
   if (!a) return Problem{"body_a", "names no body of this scene: " + std::to_string(joint.a)};
@@ -55,6 +57,11 @@ MaybeProblem ends_problem(const Scene& scene, const Joint& joint) {
   if (a == b) return Problem{"body_b", "must be another body than body_a"};
   if (b && !b->is_static && joint.b < joint.a) return Problem{"body_b", "must have a higher id than body_a"};
   if (a->motion && (!b || b->is_static || b->motion)) return Problem{"", "neither of its bodies can be moved by it"};
+  // Nothing but a distance and a ball joint without limits does without turning one of its bodies.
+  const bool turns = joint.kind != JointKind::kDistance &&
+                     (joint.kind != JointKind::kBall || joint.limits || joint.cone_limit);
+  if (turns && !can_turn(*a) && (!b || !can_turn(*b)))
+    return Problem{"", "neither of its bodies can be turned by it (fixed_rotation)"};
   const Vec3 place_a = (a->pose * joint.frame_a).position;
   const Vec3 place_b = b ? (b->pose * joint.frame_b).position : joint.frame_b.position;
   const double apart = (place_a - place_b).norm(), most = joint_reach_a(scene, joint) + joint_reach_b(scene, joint);

@@ -16,7 +16,8 @@ Vec3 no_longer(const Vec3& v, double most) {
 
 void set_limited(BodyState& body, const Model& model, const Vec3& linear, const Vec3& angular) {
   wake(body);
-  const Vec3 v = no_longer(linear, model.scene().max_speed), w = no_longer(angular, kMaxSpin);
+  const Vec3 v = no_longer(linear, model.scene().max_speed);
+  const Vec3 w = model.find(body.id)->fixed_rotation ? Vec3(Vec3::Zero()) : no_longer(angular, kMaxSpin);
   if (!std::isfinite(v.sum() + w.sum())) return;
   body.set_v(v);
   body.set_w(w);

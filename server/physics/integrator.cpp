@@ -89,6 +89,7 @@ void accelerate(MovingBody& body, double h, const StepConstants& constants) {
 void move(MovingBody& body, double h, const StepConstants& constants) {
   limit_speed(body, constants.max_speed);
   body.moved += h * body.v;
+  if (body.model->fixed_rotation) return;
   const Vec3 turn = h * body.w;
   body.turned += turn;
   const bool gyroscopic = !body.model->isotropic && turn.squaredNorm() > kGyroscopicAngle * kGyroscopicAngle;

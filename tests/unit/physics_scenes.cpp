@@ -124,6 +124,7 @@ Scene shapes_scene() {
       body.friction = 0.4 + 0.1 * (i % 4);
       body.angular_damping = 0.3;  // round things would roll for long
       if (i % 5 == 0) body.restitution = 0.4;
+      body.fixed_rotation = i % 8 == 6;
     }
   builder.add_static(Plane{}, Vec3(0, 0, 0)).friction = 0.7;
   builder.add_static(bowl(1.9, 1.2, 6, 17), Vec3(-6, 0, 0.05));

@@ -53,6 +53,29 @@ Scene every_joint() {
   return builder.finish();
 }
 
+TEST(SceneJoints, OfBodiesThatNothingTurnsDoNotTurnThem) {
+  const auto accepted = [](JointKind kind, bool b_turns, bool cone = false) {
+    SceneBuilder builder("upright");
+    for (int i = 0; i < 2; ++i) builder.add(Box{Vec3(1, 1, 1)}, Vec3(i, 0, 0)).fixed_rotation = i == 0 || !b_turns;
+    Joint& joint = builder.add_joint(kind, 0, 1, Vec3(0.5, 0, 0));
+    if (kind == JointKind::kSlider || kind == JointKind::kDistance) joint.limits = JointLimits{0, 1};
+    if (cone) joint.cone_limit = 1;
+    try {
+      builder.finish();
+      return true;
+    } catch (const SceneError& e) {
+      EXPECT_NE(e.reason.find("fixed_rotation"), std::string::npos) << e.what();
+      return false;
+    }
+  };
+  for (const JointKind kind : {JointKind::kFixed, JointKind::kHinge, JointKind::kSlider, JointKind::kUniversal}) {
+    EXPECT_TRUE(accepted(kind, true)) << name_of(kind);
+    EXPECT_FALSE(accepted(kind, false)) << name_of(kind);
+  }
+  for (const JointKind kind : {JointKind::kBall, JointKind::kDistance}) EXPECT_TRUE(accepted(kind, false));
+  EXPECT_FALSE(accepted(JointKind::kBall, false, true));
+}
+
 TEST(SceneJoints, BinaryKeepsEveryBit) {
   const Scene scene = every_joint();
   const Scene again = decode_scene(encode_scene(scene), "memory");

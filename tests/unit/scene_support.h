@@ -52,6 +52,12 @@ inline Scene every_kind() {
   builder.add(hull, Vec3(8, 0, 0)).name = "hull";
   Body& compound = builder.add(Box{Vec3(1, 1, 1)}, Vec3(10, 0, 0));
   compound.shapes.push_back({builder.geometry(Sphere{0.1}), Pose{Vec3(0, 0, 1.0 / 3), Quat(0, 1, 0, 0)}});
+  Body& lift = builder.add(Box{Vec3(1, 1, 1)}, Vec3(12, 0, 0));
+  lift.motion = PrescribedMotion{Vec3(-0.0, 1.0 / 3, 1), Vec3(0, -0.0, 0.7), 1.0 / 7, -0.1, Vec3(5e-324, 0, 1)};
+  Body& upright = builder.add(Box{Vec3(1, 1, 1)}, Vec3(14, 0, 0));
+  upright.fixed_rotation = true;
+  upright.collision_groups = 0x80000001;
+  upright.collision_mask = 0;
   builder.add_static(Plane{Vec3(0, 0.6, 0.8)}, Vec3(0, 0, -1)).friction = 0;
   builder.add_static(TriangleMesh{{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0.1)}, {{0, 1, 2}}}, Vec3(0, 5, 0));
   builder.add_static(HeightField{2, 3, 0.5, 0.25, {0, 0.1, 0.2, 0.3, -0.4, 0.5}}, Vec3(0, 9, 0));
@@ -132,6 +138,15 @@ inline void expect_same_bits(const Scene& a, const Scene& b) {
       EXPECT_EQ(l.shapes[s].geometry, r.shapes[s].geometry);
       EXPECT_TRUE(same_bits_of(l.shapes[s].pose.position, r.shapes[s].pose.position));
       EXPECT_TRUE(same_bits_of(l.shapes[s].pose.orientation.coeffs(), r.shapes[s].pose.orientation.coeffs()));
+    }
+    EXPECT_EQ(l.fixed_rotation, r.fixed_rotation);
+    EXPECT_TRUE(l.collision_groups == r.collision_groups && l.collision_mask == r.collision_mask);
+    ASSERT_EQ(l.motion.has_value(), r.motion.has_value());
+    if (l.motion) {
+      EXPECT_TRUE(same_bits_of(l.motion->velocity, r.motion->velocity));
+      EXPECT_TRUE(same_bits_of(l.motion->amplitude, r.motion->amplitude));
+      EXPECT_TRUE(same_bits(l.motion->frequency, r.motion->frequency) && same_bits(l.motion->phase, r.motion->phase));
+      EXPECT_TRUE(same_bits_of(l.motion->angular_velocity, r.motion->angular_velocity));
     }
     ASSERT_EQ(l.drive.has_value(), r.drive.has_value());
     if (!l.drive) continue;
