@@ -16,6 +16,7 @@ void accuracy(const Options& options, Headline& headline);  // errors against co
 void sync_groups(const Options& options, Headline& headline);  // worlds that hang together, by the number of bodies
 void granularity(const Options& options, Headline& headline);  // the same, by the number of worlds
 void resilience(const Options& options, Headline& headline);   // steps on time after the load has grown
+void worst_case(const Options& options, Headline& headline);   // one island that reaches through all worlds
 void scaling(const Options& options, Headline& headline);      // speed-up and efficiency on 1 to 1,024 worlds
 
 }  // namespace soda::bench

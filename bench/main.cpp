@@ -25,6 +25,7 @@ constexpr Command kCommands[] = {
     {"sync-groups", "how many worlds hang together at a step, by the number of bodies", soda::bench::sync_groups},
     {"granularity", "how many worlds hang together at a step, by the number of worlds", soda::bench::granularity},
     {"resilience", "steps that stay on time when a world's load grows at once", soda::bench::resilience},
+    {"worst-case", "everything in contact with everything, on one, two and four worlds", soda::bench::worst_case},
     {"scaling", "strong and weak scaling of a city, on real worlds and on a model of a cluster", soda::bench::scaling},
     {"accuracy", "errors of known motions against their cost, for many step settings and stock Bullet",
      soda::bench::accuracy, true},

@@ -39,7 +39,7 @@ SessionRun SessionRuns::run(const std::string& arguments, Step steps) const {
       throw std::runtime_error("no " + key + " in the statistics of soda run");
     return std::stod(match[1]);
   };
-  return {number("wall_seconds"), number("cpu_seconds"), number("waiting_seconds"), number("mixed_islands")};
+  return {number("wall_seconds"), number("cpu_seconds"), number("waiting_seconds"), number("mixed_islands"), number("bytes_sent")};
 }
 
 }  // namespace soda::bench

@@ -11,7 +11,7 @@ namespace soda::bench {
 
 struct SessionRun {
   double wall = 0, cpu = 0, waiting = 0;  // s; the last two summed over all worlds
-  double mixed_islands = 0;               // summed over steps
+  double mixed_islands = 0, bytes_sent = 0;  // summed over steps and worlds
 };
 
 // A scene in a file, to be run again and again as fast as possible; the file goes with the object.

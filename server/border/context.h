@@ -28,6 +28,15 @@ struct Context {
   bool all_have_reached(Step step) const {
     return std::all_of(links.begin(), links.end(), [&](const Link& link) { return link.reached(step); });
   }
+  std::size_t reached_by(Step step) const {
+    return static_cast<std::size_t>(
+        std::count_if(links.begin(), links.end(), [&](const Link& link) { return link.reached(step); }));
+  }
+  // Whether a neighbour that has not reached the step has reached the one before: its next news are of this one.
+  bool next_for_some(Step step) const {
+    return std::any_of(links.begin(), links.end(),
+                       [&](const Link& link) { return !link.reached(step) && link.reached(step - 1); });
+  }
   // State `step` is final here and with every neighbour: nothing that is known of it can change.
   bool near_final(Step step) const {
     return final_step >= step &&

@@ -42,6 +42,7 @@ bool Settler::finding(Step step, bool all) {
   if (all) exchange.kept.clear();
   // An island that changes here may have been part of a larger one with others that are kept.
   exchange.part_due = exchange.part_stale = exchange.retry = true;
+  exchange.reached = context_.reached_by(step);
   find_threats(step);
   return !threats_.empty();
 }
@@ -97,9 +98,16 @@ void Settler::find_threats(Step step) {
     }
 }
 
+bool Settler::is_time(Step step) const {
+  const std::size_t reached = context_.reached_by(step);
+  return reached == context_.links.size() || step <= hurry_ ||
+         (reached > at(step).reached && !context_.next_for_some(step));
+}
+
 bool Settler::is_worth_doing(Step step) {
   if (context_.all_have_reached(step)) return true;
   timeline::Timeline& timeline = context_.timeline;
+  if (step < timeline.newest() && !is_time(step)) return false;
   const std::span<const timeline::Slot> pending = timeline.pending(step);
   const auto known = deferred_.find(step);
   if (known != deferred_.end() && known->second == pending.size()) return false;
@@ -174,7 +182,9 @@ BodySet Settler::solve(BodySet island) {
 
 bool Settler::try_settle(Step step, const std::function<void(const BodySet&)>& settle) {
   Exchange& exchange = at(step);
-  if (!std::exchange(exchange.retry, false)) return false;
+  if (!exchange.retry || !is_time(step)) return false;
+  exchange.retry = false;
+  exchange.reached = context_.reached_by(step);
   const bool all_there = context_.all_have_reached(step);
   exchange.postponed = !all_there;
   if (all_there) exchange.refresh_part(context_.settings.me, context_.settings.epoch, step);
@@ -354,10 +364,10 @@ std::string Settler::why_not_final(Step step) const {
                                               ? exchange.parts.close({context_.settings.me, island.index})
                                               : MixedIslands::Closure{};
     text += "island of";
-    for (const timeline::Slot slot : island.island->own) text += " " + std::to_string(context_.model.bodies()[slot].id);
+    for (const timeline::Slot slot : island.island->own) text += " " + std::to_string(context_.timeline.id_of(slot));
     text += " with";
     for (const timeline::Slot slot : island.island->foreign)
-      text += " " + std::to_string(context_.model.bodies()[slot].id);
+      text += " " + std::to_string(context_.timeline.id_of(slot));
     text += island.state == State::kSolved ? ": solved" : island.state == State::kOpen ? ": open" : ": unconfirmed";
     for (const WorldId world : closure.missing) text += ", lacks " + std::to_string(world);
     if (!closure.misfit.empty()) text += " (" + closure.misfit + ")";

@@ -34,6 +34,13 @@ class Settler {
   // Where those may be at `step` for whom its islands must wait.
   void find_threats(Step step);
 
+  // Whether it is time to work at a step again that not all neighbours have reached. Each look costs about as much as
+  // what it finds to do, so it waits until as many have reached the step as will soon, which is one look for all who
+  // keep pace, and one more for those who lag.
+  bool is_time(Step step) const;
+  // Steps up to this one are worked at whenever there is anything to do: somebody waits to see it.
+  void hurry(Step step) { hurry_ = std::max(hurry_, step); }
+
   // Whether more would come of doing a step's pending bodies now than islands that must wait, to be found again when
   // those have told their bodies for whom they wait.
   bool is_worth_doing(Step step);
@@ -79,7 +86,7 @@ class Settler {
 
   const Context& context_;
   std::deque<Exchange> exchanges_;
-  Step base_ = 0;
+  Step base_ = 0, hurry_ = -1;
   Threats threats_;
   timeline::Marks threatening_;
   std::vector<std::pair<bool, Part>> later_parts_;  // for steps without an entry yet; whether direct

@@ -105,6 +105,7 @@ class WorldCore::Impl final : timeline::Arbiter {
       neighbourhood_.model_grew();
     }
     timeline_.act(action);
+    settler_.hurry(timeline_.newest());
     ++logged_;
     ++stats_.actions;
     settler_.reconsider();
@@ -282,7 +283,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     if (step < final_ || step >= timeline_.newest()) return;
     std::vector<timeline::Slot> slots;
     for (const BodyId id : bodies)
-      if (model_.find(id)) slots.push_back(timeline_.slot_of(id));
+      if (const timeline::Slot slot = timeline_.slot_of(id); slot != timeline::kNoSlot) slots.push_back(slot);
     timeline_.touch(step, slots);
     changed();
   }

@@ -168,12 +168,12 @@ Choice Chooser::choose(const IslandView& island) {
   const double wanted = stiffness_wanted(island);
   std::uint32_t stiffness = level_for(wanted);
   if (had > stiffness) stiffness = wanted < kSofterBelow * static_cast<double>(1u << had) ? had - 1 : had;
-  // Where many bodies share each level, contacts do well that are twice as stiff for their sub-steps; a stack would
+  // Where many bodies share each level, contacts do well that are stiffer than their sub-steps allow; a stack would
   // begin to sway, and so does what is heavy on what is light, which is why it wants more.
-  const bool broad = deepest_ > 0 && static_cast<double>(island.bodies.size()) > kBroadIsland * deepest_ &&
-                     stiffness <= kMostBroadStiffness;
-  const std::uint32_t least = broad && stiffness > kLeastSubstepLevel ? stiffness - 1 : stiffness;
-  return {1u << std::max(least, level_for(motion_wanted(island))), stiffness};
+  const bool heap = deepest_ > 0 && static_cast<double>(island.bodies.size()) > kHeapIsland * deepest_ &&
+                    stiffness > kLeastSubstepLevel && stiffness <= kMostHeapStiffness;
+  const std::uint32_t least = heap ? stiffness - 1 : stiffness;
+  return {1u << std::max(least, level_for(motion_wanted(island))), stiffness, heap};
 }
 
 std::uint32_t flight_substeps(const BodyState& state, const BodyModel& model, const StepConstants& constants) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <numbers>
 
 #include "server/physics/contact_update.h"
 #include "server/physics/impacts.h"
@@ -42,11 +43,12 @@ void IslandSolver::tune(std::uint32_t substeps) {
   if (substeps == substeps_) return;
   substeps_ = substeps;
   h_ = constants_.dt / substeps;
-  for (std::uint32_t level = 0; level <= kMostSubstepLevel; ++level) {
-    const double rate = (level == 0 ? substeps : 1u << level) / constants_.dt;
+  for (std::uint32_t half = 0; half <= 2 * kMostSubstepLevel; ++half) {
+    const double as_for = half == 0 ? substeps : (1u << half / 2) * (half % 2 ? std::numbers::sqrt2 : 1.0);
+    const double rate = as_for / constants_.dt;
     const double hertz = std::min(kContactHertzCap, kContactHertzPerSubstepRate * rate);
-    soft_[level][0] = soften(hertz, kContactDampingRatio, h_);
-    soft_[level][1] = soften(kStaticHertzFactor * hertz, kStaticDampingFactor * kContactDampingRatio, h_);
+    soft_[half][0] = soften(hertz, kContactDampingRatio, h_);
+    soft_[half][1] = soften(kStaticHertzFactor * hertz, kStaticDampingFactor * kContactDampingRatio, h_);
   }
 }
 
@@ -73,7 +75,7 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
                            const Surface& surface, const ContactRecord& record, Batch& batch, int lane) const {
   const MovingBody& a = bodies[slot_a];
   const MovingBody* const b = slot_b == kNoBody ? nullptr : &bodies[slot_b];
-  const Softness& soft = soft_[surface.stiffness][b ? 0 : 1];
+  const Softness& soft = soft_[surface.half_octaves][b ? 0 : 1];
   const double share = 1.0 / substeps_;  // of what the record carried in a step
   batch.a[lane] = slot_a;
   batch.b[lane] = slot_b;

@@ -24,7 +24,7 @@ struct Surface {
   // How much of the place of contact's motion against the bodies is against a: nothing of round bodies, which roll on
   // under it, and all of what they roll on.
   double moves_on_a = 0.5;
-  std::uint32_t stiffness = 0;         // see Choice
+  std::uint32_t half_octaves = 0;      // of stiffness, see Choice
   const StaticModel* fixed = nullptr;  // b, where it is static
   const JointModel* joint = nullptr;   // or, instead of all of these, the joint that the record is of
 };
@@ -61,8 +61,8 @@ class IslandSolver {
 
   const StepConstants& constants_;
   std::uint32_t substeps_ = 0;
-  double h_ = 0;                                  // s, one sub-step
-  Softness soft_[kMostSubstepLevel + 1][2] = {};  // by stiffness, and whether against a static body
+  double h_ = 0;                                      // s, one sub-step
+  Softness soft_[2 * kMostSubstepLevel + 1][2] = {};  // by half octaves, and whether against a static body
   const Kernel* kernel_ = &chosen_kernel();
   JointSolver joints_;
   std::vector<Batch> batches_;

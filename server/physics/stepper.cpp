@@ -361,7 +361,7 @@ void Stepper::solve(std::span<BodyState> bodies, std::span<ContactRecord> contac
     }
     for (const std::uint32_t c : touching) {
       find_surface(contacts[c], ends[c], surfaces_[c]);
-      surfaces_[c].stiffness = choice.stiffness;
+      surfaces_[c].half_octaves = choice.half_octaves();
       shares.bouncing += !surfaces_[c].joint && surfaces_[c].restitution > 0 ? 1 : 0;
     }
     sorted_.insert(sorted_.end(), touching.begin(), touching.end());

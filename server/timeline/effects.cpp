@@ -15,10 +15,8 @@ constexpr Step kEver = std::numeric_limits<Step>::max();
 
 }  // namespace
 
-Slot Effects::slot_of(BodyId id) const {
-  const physics::BodyModel* const body = model_.find(id);
-  if (!body) throw std::invalid_argument("action: there is no body " + std::to_string(id));
-  return static_cast<Slot>(body - model_.bodies().data());
+void Effects::check_known(BodyId id) const {
+  if (!model_.find(id)) throw std::invalid_argument("action: there is no body " + std::to_string(id));
 }
 
 Effects::Held* Effects::held(ActionNumber number) {
@@ -29,9 +27,9 @@ Effects::Held* Effects::held(ActionNumber number) {
 std::vector<Effects::Change> Effects::add(const LoggedAction& entry) {
   std::vector<Change> changes;
   const auto put = [&](Step step, BodyId id, Effect effect) {
-    const Slot slot = slot_of(id);
-    by_step_[step][slot].push_back(std::move(effect));
-    changes.push_back({slot, step, step});
+    check_known(id);
+    by_step_[step][id].push_back(std::move(effect));
+    changes.push_back({id, step, step});
   };
   std::visit(Overloaded{
                  [&](const Push& a) { put(entry.step, a.body, a); },
@@ -44,16 +42,17 @@ std::vector<Effects::Change> Effects::add(const LoggedAction& entry) {
                    put(entry.step, a.body, Wake{});
                    put(entry.step + 1, a.body, Given{});
                    for (Held& h : held_)
-                     if (h.slot == slot_of(a.body)) h.end = std::min(h.end, entry.step + 1);
+                     if (h.body == a.body) h.end = std::min(h.end, entry.step + 1);
                  },
                  [&](const Spawn& a) {
                    const Body& body = a.body->bodies.front();
                    put(entry.step, body.id, Given{model_.state_of(body)});
                  },
                  [&](const Grab& a) {
-                   Held h{entry.number, slot_of(a.body), entry.step, kEver, {}, {{entry.step, a.target}}};
+                   check_known(a.body);
+                   Held h{entry.number, a.body, entry.step, kEver, {}, {{entry.step, a.target}}};
                    h.spring = {a.point, a.target, a.frequency, a.damping_ratio, a.max_acceleration};
-                   changes.push_back({h.slot, entry.step, kEver});
+                   changes.push_back({h.body, entry.step, kEver});
                    held_.push_back(std::move(h));
                  },
                  [&](const MoveGrab& a) {
@@ -61,12 +60,12 @@ std::vector<Effects::Change> Effects::add(const LoggedAction& entry) {
                    if (!h) return;
                    h->targets[entry.step] = a.target;
                    const auto next = h->targets.upper_bound(entry.step);
-                   changes.push_back({h->slot, entry.step, next == h->targets.end() ? h->end - 1 : next->first - 1});
+                   changes.push_back({h->body, entry.step, next == h->targets.end() ? h->end - 1 : next->first - 1});
                  },
                  [&](const Release& a) {
                    Held* const h = held(a.grab);
                    if (!h) return;
-                   changes.push_back({h->slot, entry.step, h->end - 1});
+                   changes.push_back({h->body, entry.step, h->end - 1});
                    h->end = std::min(h->end, entry.step);
                  },
              },
@@ -74,32 +73,32 @@ std::vector<Effects::Change> Effects::add(const LoggedAction& entry) {
   return changes;
 }
 
-std::span<const Effects::Effect> Effects::effects(Step step, Slot slot) const {
+std::span<const Effects::Effect> Effects::effects(Step step, BodyId id) const {
   const auto at_step = by_step_.find(step);
   if (at_step == by_step_.end()) return {};
-  const auto at = at_step->second.find(slot);
+  const auto at = at_step->second.find(id);
   return at == at_step->second.end() ? std::span<const Effect>() : at->second;
 }
 
-std::vector<Slot> Effects::acted_on(Step step) const {
-  std::vector<Slot> slots;
+std::vector<BodyId> Effects::acted_on(Step step) const {
+  std::vector<BodyId> ids;
   if (const auto at_step = by_step_.find(step); at_step != by_step_.end())
-    for (const auto& [slot, list] : at_step->second) slots.push_back(slot);
+    for (const auto& [id, list] : at_step->second) ids.push_back(id);
   for (const Held& h : held_)
-    if (h.acts(step)) slots.push_back(h.slot);
-  sort_unique(slots);
-  return slots;
+    if (h.acts(step)) ids.push_back(h.body);
+  sort_unique(ids);
+  return ids;
 }
 
-bool Effects::acts_on(Step step, Slot slot) const {
+bool Effects::acts_on(Step step, BodyId id) const {
   if (by_step_.empty() && held_.empty()) return false;
-  return !effects(step, slot).empty() ||
-         std::any_of(held_.begin(), held_.end(), [&](const Held& h) { return h.slot == slot && h.acts(step); });
+  return !effects(step, id).empty() ||
+         std::any_of(held_.begin(), held_.end(), [&](const Held& h) { return h.body == id && h.acts(step); });
 }
 
-bool Effects::gives(Step step, Slot slot, std::optional<BodyState>& state) const {
+bool Effects::gives(Step step, BodyId id, std::optional<BodyState>& state) const {
   bool given = false;
-  for (const Effect& effect : effects(step, slot))
+  for (const Effect& effect : effects(step, id))
     if (const auto* g = std::get_if<Given>(&effect)) {
       state = g->state;
       given = true;
@@ -107,8 +106,8 @@ bool Effects::gives(Step step, Slot slot, std::optional<BodyState>& state) const
   return given;
 }
 
-void Effects::apply(Step step, Slot slot, BodyState& body) const {
-  const auto list = effects(step, slot);
+void Effects::apply(Step step, BodyState& body) const {
+  const auto list = effects(step, body.id);
   // What came before a given state is void.
   std::size_t first = list.size();
   while (first > 0 && !std::holds_alternative<Given>(list[first - 1])) --first;
@@ -121,7 +120,7 @@ void Effects::apply(Step step, Slot slot, BodyState& body) const {
                },
                effect);
   for (const Held& h : held_) {
-    if (h.slot != slot || !h.acts(step)) continue;
+    if (h.body != body.id || !h.acts(step)) continue;
     physics::Spring spring = h.spring;
     spring.target = std::prev(h.targets.upper_bound(step))->second;
     physics::pull(body, model_, spring);

@@ -13,29 +13,26 @@
 
 namespace soda::timeline {
 
-// A body by its position in Model::bodies(): ascending by id.
-using Slot = std::uint32_t;
-
 class Effects {
  public:
   explicit Effects(const physics::Model& model) : model_(model) {}
 
   // Steps at which the state of a body is not what it was before the entry came.
   struct Change {
-    Slot slot = 0;
+    BodyId body = 0;
     Step first = 0, last = 0;
   };
   // The next entry of the log. A spawned body must be in the model already.
   std::vector<Change> add(const LoggedAction& entry);
 
   // Bodies that something is done to at the step, ascending.
-  std::vector<Slot> acted_on(Step step) const;
-  bool acts_on(Step step, Slot slot) const;
+  std::vector<BodyId> acted_on(Step step) const;
+  bool acts_on(Step step, BodyId id) const;
   // Whether the body's state at the step is given by an action, whatever happened before: then that state, or none if
   // it is taken away.
-  bool gives(Step step, Slot slot, std::optional<BodyState>& state) const;
+  bool gives(Step step, BodyId id, std::optional<BodyState>& state) const;
   // Does to `body`, which is the step's result or the state given for it, what else is done to it at the step.
-  void apply(Step step, Slot slot, BodyState& body) const;
+  void apply(Step step, BodyState& body) const;
 
   void forget_before(Step step);
 
@@ -47,18 +44,18 @@ class Effects {
   using Effect = std::variant<Wake, Push, SetVelocity, Given>;
   struct Held {  // a grab
     ActionNumber number = 0;
-    Slot slot = 0;
+    BodyId body = 0;
     Step first = 0, end = 0;  // it acts from `first` until before `end`
     physics::Spring spring;
     std::map<Step, Vec3> targets;  // from these steps on
     bool acts(Step step) const { return step >= first && step < end; }
   };
-  Slot slot_of(BodyId id) const;
-  std::span<const Effect> effects(Step step, Slot slot) const;
+  void check_known(BodyId id) const;
+  std::span<const Effect> effects(Step step, BodyId id) const;
   Held* held(ActionNumber number);
 
   const physics::Model& model_;
-  std::map<Step, std::map<Slot, std::vector<Effect>>> by_step_;  // in the log's order
+  std::map<Step, std::map<BodyId, std::vector<Effect>>> by_step_;  // in the log's order
   std::vector<Held> held_;                                       // likewise
 };
 

@@ -1,4 +1,4 @@
-// Sets of slots: sorted, and as marks that are all taken away at once.
+// Sets: of slots or ids, sorted, and of slots as marks that are all taken away at once.
 #pragma once
 
 #include <algorithm>
@@ -8,9 +8,10 @@
 
 namespace soda::timeline {
 
-inline void sort_unique(std::vector<std::uint32_t>& slots) {
-  if (!std::is_sorted(slots.begin(), slots.end())) std::sort(slots.begin(), slots.end());
-  slots.erase(std::unique(slots.begin(), slots.end()), slots.end());
+template <typename T>
+void sort_unique(std::vector<T>& items) {
+  if (!std::is_sorted(items.begin(), items.end())) std::sort(items.begin(), items.end());
+  items.erase(std::unique(items.begin(), items.end()), items.end());
 }
 
 class Marks {

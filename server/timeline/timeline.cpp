@@ -37,6 +37,7 @@ bool same(const NearSet& l, const NearSet& r) {
 
 Timeline::Timeline(const physics::Model& model, WorldId me, std::size_t sources, Arbiter& arbiter)
     : model_(model),
+      slots_(model),
       me_(me),
       arbiter_(arbiter),
       stepper_(model),
@@ -44,26 +45,24 @@ Timeline::Timeline(const physics::Model& model, WorldId me, std::size_t sources,
       told_(sources),
       effects_(model) {
   Entry& first = entries_.emplace_back();
-  first.produced = Table<Record>(model.bodies().size());
-  first.islands = Table<Island>(model.bodies().size());
   first.heard.assign(sources, Ref(new NearSet));
   for (const BodyState& body : model.initial_state().bodies) {
     const Place place = arbiter_.place(body, 0);
-    if (place.owner == me_) results_.emplace_back(slot_of(body.id), make_record(body, {}, place, 0));
+    if (place.owner == me_) results_.emplace_back(slots_.of(body.id), make_record(body, {}, place, 0));
   }
   store(0, results_);
   arbiter_.extended(0);
 }
 
-Slot Timeline::slot_of(BodyId id) const { return static_cast<Slot>(model_.find(id) - model_.bodies().data()); }
-
-Ref<NearSet> Timeline::near_set(const BodySet& set, Step step) const {
+Ref<NearSet> Timeline::near_set(const BodySet& set, Step step) {
   Ref<NearSet> near(new NearSet);
   near->bodies.reserve(set.bodies.size());
   std::span<const ContactRecord> rest(set.contacts);
   for (const BodyState& body : set.bodies)
     near->bodies.push_back(
-        {slot_of(body.id), make_record(body, take_contacts(rest, body.id), arbiter_.place(body, step), -1)});
+        {slots_.of(body.id), make_record(body, take_contacts(rest, body.id), arbiter_.place(body, step), -1)});
+  std::sort(near->bodies.begin(), near->bodies.end(),
+            [](const NearSet::Body& l, const NearSet::Body& r) { return l.slot < r.slot; });
   return near;
 }
 
@@ -76,11 +75,15 @@ const Record* Timeline::known(Step step, Slot slot) const {
 }
 
 BodySet Timeline::all_produced(Step step) const {
+  std::vector<const Record*> records;
+  at(step).produced.for_each([&](Slot, const Ref<Record>& record) { records.push_back(record.get()); });
+  std::sort(records.begin(), records.end(),
+            [](const Record* l, const Record* r) { return l->body.id < r->body.id; });
   BodySet set;
-  at(step).produced.for_each([&](Slot, const Ref<Record>& record) {
+  for (const Record* const record : records) {
     set.bodies.push_back(record->body);
     set.contacts.insert(set.contacts.end(), record->contacts().begin(), record->contacts().end());
-  });
+  }
   return set;
 }
 
@@ -160,7 +163,7 @@ void Timeline::extend() {
   }
   arbiter_.extended(newest());
   // What nothing pending touches has its result already.
-  for (const Slot slot : effects_.acted_on(newest())) do_actions(newest(), slot);
+  for (const BodyId id : effects_.acted_on(newest())) do_actions(newest(), id);
 }
 
 // The same body where space has changed hands about it.
@@ -195,7 +198,7 @@ void Timeline::change_hands(Step step) {
 }
 
 bool Timeline::is_large(Slot slot, const BodyState& body) const {
-  const double radius = model_.bodies()[slot].reach, dt = model_.scene().dt;
+  const double radius = slots_.body(slot).reach, dt = model_.scene().dt;
   const double reach =
       radius * (1 + std::min(1.0, body.w().norm() * dt)) + body.v().norm() * dt + physics::kContactMargin;
   return reach > index_.ordinary_reach();
@@ -249,30 +252,31 @@ bool Timeline::is_indexed() const {
 void Timeline::act(const LoggedAction& action) {
   for (const Effects::Change& change : effects_.add(action))
     for (Step step = std::max(change.first, base_ + 1); step <= std::min(change.last, newest()); ++step)
-      do_actions(step, change.slot);
+      do_actions(step, change.body);
 }
 
 // The record of a body for which something is done at the step: none if it is taken away, or somebody else's to
 // produce.
-Ref<Record> Timeline::after_actions(Step step, Slot slot, const Record* raw) const {
+Ref<Record> Timeline::after_actions(Step step, BodyId id, const Record* raw) const {
   std::optional<BodyState> state;
-  const bool given = effects_.gives(step, slot, state);
+  const bool given = effects_.gives(step, id, state);
   if (!given && raw) state = raw->body;
   if (!state || (given && arbiter_.place(*state, step).owner != me_)) return {};
-  effects_.apply(step, slot, *state);
+  effects_.apply(step, *state);
   if (given) return make_record(*state, {}, arbiter_.place(*state, step), step);
   return make_record(*state, raw->contacts(), arbiter_.place(*state, step), raw->computed);
 }
 
 // Does what is done to a body at a step again, with the result that is known.
-void Timeline::do_actions(Step step, Slot slot) {
+void Timeline::do_actions(Step step, BodyId id) {
   Entry& entry = at(step);
+  const Slot slot = slots_.of(id);
   const Record* const before = entry.produced.get(slot);
   const auto kept = entry.raw.find(slot);
   const Ref<Record> raw = kept != entry.raw.end() ? kept->second : Ref<Record>(entry.produced.get(slot));
-  Ref<Record> now = after_actions(step, slot, raw.get());
+  Ref<Record> now = after_actions(step, id, raw.get());
   // Where nothing is done any more (a grab was released), the result is the record, and is not kept beside it.
-  if (!effects_.acts_on(step, slot))
+  if (!effects_.acts_on(step, id))
     entry.raw.erase(slot);
   else if (raw)
     entry.raw.insert_or_assign(slot, raw);
@@ -299,7 +303,7 @@ void Timeline::set_departed(Entry& entry, Slot slot, bool departed) {
 void Timeline::take_away(Step step, Slot slot) {
   std::optional<BodyState> given;
   at(step + 1).raw.erase(slot);
-  if (!effects_.gives(step + 1, slot, given)) drop(step + 1, slot);
+  if (!effects_.gives(step + 1, id_of(slot), given)) drop(step + 1, slot);
 }
 
 void Timeline::drop(Step step, Slot slot) {
@@ -321,14 +325,14 @@ void Timeline::settle(Step step, const BodySet& results) {
   acting_ = effects_.acted_on(step + 1);
   std::span<const ContactRecord> rest(results.contacts);
   for (const BodyState& body : results.bodies)
-    take_result(step + 1, slot_of(body.id), body, take_contacts(rest, body.id));
+    take_result(step + 1, slots_.of(body.id), body, take_contacts(rest, body.id));
   store(step + 1, results_);
 }
 
 // The result of an own body for `step`; one that is there already changes nothing.
 void Timeline::take_result(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts) {
   ++stats_.bodies_computed;
-  if (!acting_.empty() && std::binary_search(acting_.begin(), acting_.end(), slot))
+  if (!acting_.empty() && std::binary_search(acting_.begin(), acting_.end(), body.id))
     return take_acted(step, slot, body, contacts);
   const Record* const old = at(step).produced.get(slot);
   if (old && same(*old, body, contacts))
@@ -343,7 +347,7 @@ void Timeline::take_acted(Step step, Slot slot, const BodyState& body, std::span
   if (raw && same(*raw, body, contacts)) return;  // healed
   raw = make_record(body, contacts, arbiter_.place(body, step), step);
   const Record* const before = entry.produced.get(slot);
-  Ref<Record> now = after_actions(step, slot, raw.get());
+  Ref<Record> now = after_actions(step, body.id, raw.get());
   if (!now)
     drop(step, slot);
   else if (!before || !same(*before, *now))
@@ -352,9 +356,11 @@ void Timeline::take_acted(Step step, Slot slot, const BodyState& body, std::span
     entry.pending.push_back(slot);  // the step leads elsewhere from here, though this is what was here already
 }
 
-// New records of bodies produced at `step`, ascending by slot.
+// New records of bodies produced at `step`.
 void Timeline::store(Step step, std::vector<Table<Record>::Item>& items) {
   if (items.empty()) return;
+  const auto before = [](const auto& l, const auto& r) { return l.first < r.first; };
+  if (!std::is_sorted(items.begin(), items.end(), before)) std::sort(items.begin(), items.end(), before);
   Entry& entry = at(step);
   std::uint64_t redone = 0;
   for (const auto& [slot, record] : items) {

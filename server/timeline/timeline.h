@@ -24,6 +24,7 @@
 #include "server/timeline/effects.h"
 #include "server/timeline/marks.h"
 #include "server/timeline/record.h"
+#include "server/timeline/slots.h"
 #include "server/timeline/spatial_index.h"
 
 namespace soda::timeline {
@@ -31,7 +32,7 @@ namespace soda::timeline {
 // Bodies that must be solved together at a step, as far as this world sees.
 struct Island {
   std::uint32_t references = 0;
-  std::vector<Slot> own, foreign;  // ascending
+  std::vector<Slot> own, foreign;  // ascending by id
   friend void release(Island* island) { delete island; }
 };
 
@@ -101,7 +102,7 @@ class Timeline {
   void add_source();
   // `source` produced these bodies at `step`, and no others that matter here. For steps to come, too.
   void hear(std::size_t source, Step step, Ref<NearSet> set);
-  Ref<NearSet> near_set(const BodySet& set, Step step) const;  // of bodies received
+  Ref<NearSet> near_set(const BodySet& set, Step step);  // of bodies received
   const Ref<NearSet>& heard(std::size_t source, Step step) const { return at(step).heard[source]; }
 
   // The next entry of the action log: changes what has been computed of its step and, of what lasts, of later ones. The
@@ -160,7 +161,9 @@ class Timeline {
   // Entries before `step` are not needed any more.
   void release_before(Step step);
 
-  Slot slot_of(BodyId id) const;
+  // kNoSlot for a body that this world has never known.
+  Slot slot_of(BodyId id) const { return slots_.find(id); }
+  BodyId id_of(Slot slot) const { return slots_.body(slot).id; }
   physics::Stepper& stepper() { return stepper_; }
   const physics::Model& model() const { return model_; }
   const TimelineStats& stats() const { return stats_; }
@@ -201,13 +204,14 @@ class Timeline {
   bool grown(Step step);
   void sort_out(Step step, bool all);
   void keep(Step step, std::uint32_t island, Ref<Island> members);
-  void do_actions(Step step, Slot slot);
-  Ref<Record> after_actions(Step step, Slot slot, const Record* raw) const;
+  void do_actions(Step step, BodyId id);
+  Ref<Record> after_actions(Step step, BodyId id, const Record* raw) const;
   void take_result(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts);
   void take_acted(Step step, Slot slot, const BodyState& body, std::span<const ContactRecord> contacts);
   void store(Step step, std::vector<Table<Record>::Item>& items);
 
   const physics::Model& model_;
+  Slots slots_;
   const WorldId me_;
   Arbiter& arbiter_;
   physics::Stepper stepper_;
@@ -224,7 +228,7 @@ class Timeline {
   Step unfinished_ = -1;
   std::vector<Slot> changed_;   // bodies whose record at the step is another than before, ascending
   std::vector<Slot> affected_;  // own bodies to do
-  std::vector<Slot> around_;    // those, and all that may touch them, ascending
+  std::vector<Slot> around_;    // those, and all that may touch them, ascending by id
   std::vector<Slot> candidates_;
   Marks in_changed_, in_affected_, in_around_, in_old_islands_;
   std::vector<Ref<Island>> old_islands_;
@@ -240,7 +244,7 @@ class Timeline {
   std::vector<std::uint8_t> has_result_;  // by position in bodies_
   std::vector<Aabb> boxes_;
   std::vector<Table<Record>::Item> results_;
-  std::vector<Slot> acting_;  // bodies that something is done to at the step of the results, ascending
+  std::vector<BodyId> acting_;  // bodies that something is done to at the step of the results, ascending
   std::vector<std::pair<Slot, const Record*>> stored_;
   std::vector<Table<Island>::Item> island_items_;
 };

@@ -73,7 +73,8 @@ void Timeline::gather_all(Step step) {
 }
 
 void Timeline::find(Step step) {
-  if (!std::is_sorted(around_.begin(), around_.end())) std::sort(around_.begin(), around_.end());
+  const auto by_id = [&](Slot l, Slot r) { return slots_.by_id(l, r); };
+  if (!std::is_sorted(around_.begin(), around_.end(), by_id)) std::sort(around_.begin(), around_.end(), by_id);
   bodies_.clear();
   records_.clear();
   previous_.clear();
@@ -171,7 +172,7 @@ void Timeline::sort_out(Step step, bool all) {
   const bool may_wait = arbiter_.finding(step, all);
   island_items_.clear();
   if (all) {
-    entry.islands = Table<Island>(model_.bodies().size());
+    entry.islands = Table<Island>();
   } else {
     for (const Ref<Island>& old : old_islands_) {
       arbiter_.dropped(step, *old);

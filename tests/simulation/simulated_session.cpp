@@ -311,14 +311,13 @@ void add(border::CoreStats& sum, const border::CoreStats& s) {
 namespace {
 
 // What is done at a step, to all bodies at once.
-void do_actions(const timeline::Effects& effects, const physics::Model& model, Step step, BodySet& set) {
-  for (const timeline::Slot slot : effects.acted_on(step)) {
-    const BodyId id = model.bodies()[slot].id;
+void do_actions(const timeline::Effects& effects, Step step, BodySet& set) {
+  for (const BodyId id : effects.acted_on(step)) {
     auto body = std::lower_bound(set.bodies.begin(), set.bodies.end(), id,
                                  [](const BodyState& b, BodyId i) { return b.id < i; });
     const bool there = body != set.bodies.end() && body->id == id;
     std::optional<BodyState> given;
-    if (effects.gives(step, slot, given)) {
+    if (effects.gives(step, id, given)) {
       std::erase_if(set.contacts, [&](const ContactRecord& c) { return c.a == id; });
       if (there && !given) {
         set.bodies.erase(body);
@@ -332,7 +331,7 @@ void do_actions(const timeline::Effects& effects, const physics::Model& model, S
     } else if (!there) {
       continue;
     }
-    effects.apply(step, slot, *body);
+    effects.apply(step, *body);
   }
 }
 
@@ -348,7 +347,7 @@ std::vector<StepDigest> run_single(const Scene& scene, Step steps, const Actions
   BodySet set = model.initial_state();
   std::vector<StepDigest> digests;
   for (Step t = 0;; ++t) {
-    do_actions(effects, model, t, set);
+    do_actions(effects, t, set);
     digests.push_back({set.bodies.size(), bodies_hash(set.bodies)});
     if (t == steps) return digests;
     stepper.step(set);

@@ -145,6 +145,26 @@ TEST(Choices, AHeapGetsHalfOfTheSubstepsOfAStack) {
   EXPECT_EQ(of(9), 2u);
 }
 
+// With contacts fully as stiff as the stack's they would swing against each other for a quarter of a minute.
+TEST(Choices, AHeapOfBoxesComesToRest) {
+  SceneBuilder builder = on_ground();
+  Random random(18);
+  for (int i = 0; i < 384; ++i)
+    builder.add(Box{Vec3::Constant(0.2)}, 0.23 * Vec3(i % 8 - 3.5, i / 8 % 8 - 3.5, i / 64) + Vec3(0, 0, 0.15) +
+                                              random.between(Vec3::Constant(-0.01), Vec3::Constant(0.01)));
+  for (const double side : {-1.5, 1.5}) {
+    builder.add_static(Box{Vec3(1, 4, 4)}, Vec3(side, 0, 2));
+    builder.add_static(Box{Vec3(4, 1, 4)}, Vec3(0, side, 2));
+  }
+  World world(builder);
+  world.steps(300);
+  EXPECT_GT(world.stepper.shares.solved[1].bodies, 300u * 300u);
+  EXPECT_EQ(world.set.bodies[0].stiffness(), 2u);
+  double fastest = 0;
+  for (const BodyState& body : world.set.bodies) fastest = std::max(fastest, body.v().norm());
+  EXPECT_LT(fastest, 0.02);
+}
+
 // Sub-steps that change from step to step: the impulses that contacts carry follow.
 TEST(Choices, ATowerStandsWhileItsSubstepsChange) {
   SceneBuilder builder = on_ground();

@@ -247,7 +247,7 @@ TEST(Timeline, AChangeDoesAgainWhatItTouchesAndNothingElse) {
 
   BodySet set;
   for (const BodyState& body : model.initial_state().bodies)
-    if (timeline.slot_of(body.id) == stranger_slot) set.bodies.push_back(body);
+    if (body.id == model.bodies()[stranger_slot].id) set.bodies.push_back(body);
   ASSERT_EQ(set.bodies.size(), 1u);
   // At step 10 it is close to the first group.
   timeline.hear(0, 10, timeline.near_set(set, 10));
