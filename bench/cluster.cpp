@@ -121,7 +121,7 @@ Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, balance::Balance
     network += network_.receive_seconds + network_.receive_seconds_per_byte * static_cast<double>(bytes.size());
   }
   measure(Activity::kReceiving);
-  done.worked = core.work() == border::Progress::kWorked;
+  done.progress = core.work(piece.patient);
   measure(Activity::kWorking);
   if (balancer) {
     balancer->worked(done.seconds);
@@ -132,7 +132,7 @@ Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, balance::Balance
   for (const border::Outgoing& message : done.out)
     network += network_.send_seconds + network_.send_seconds_per_byte * static_cast<double>(message.bytes.size());
   spend(Activity::kNetwork, network);
-  usage.pieces += done.worked;
+  usage.pieces += done.progress == border::Progress::kWorked;
   return done;
 }
 
@@ -149,9 +149,14 @@ void Cluster::look(WorldId w) {
   bool more = true;
   while (more && !world.busy && !stopped_) {
     Piece piece = std::exchange(world.next, {});
+    piece.patient = std::exchange(world.patient, true);
     Done done = work(w, *world.core, world.balancer.get(), piece, costs_, world.usage);
     if (world.recorded) world.pieces.push_back(std::move(piece));
-    more = done.worked;
+    more = done.progress == border::Progress::kWorked;
+    if (done.progress == border::Progress::kHolding)
+      hold(w, done.seconds);
+    else
+      world.holds = 0;
     if (!(done.seconds > 0)) {
       hand_over(w, std::move(done.out));
       continue;
@@ -164,6 +169,20 @@ void Cluster::look(WorldId w) {
       if (more || !ready.next.messages.empty() || ready.next.order) look(w);
     });
   }
+}
+
+// As the daemon does: begins without what is on its way when that has not come within a part of a step's time.
+void Cluster::hold(WorldId w, double seconds) {
+  World& world = worlds_[w];
+  if (world.holds != 0) return;
+  world.holds = number_ + 1;
+  const double step = world.usage.busy() / static_cast<double>(std::max<Step>(1, world.core->clock()));
+  at(now_ + seconds + border::kPatienceShare * step, [this, w, held = world.holds] {
+    if (worlds_[w].holds != held) return;
+    worlds_[w].holds = 0;
+    worlds_[w].patient = false;
+    look(w);
+  });
 }
 
 void Cluster::hand_over(WorldId w, std::vector<border::Outgoing> out) {

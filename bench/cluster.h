@@ -127,18 +127,20 @@ class Cluster {
   struct Piece {  // what a world is given before it works
     std::optional<Order> order;
     std::vector<std::vector<std::byte>> messages;
+    bool patient = true;
   };
   struct World {
     std::unique_ptr<border::WorldCore> core;
     std::unique_ptr<balance::Balancer> balancer;
     Piece next;  // what came while it was busy
-    bool busy = false, recorded = false;
+    bool busy = false, recorded = false, patient = true;
+    std::uint64_t holds = 0;  // since when, by number; 0: not
     std::vector<Piece> pieces;
     double line_free = 0;  // when all that it has sent has left
     Usage usage;
   };
   struct Done {
-    bool worked;
+    border::Progress progress;
     double seconds;
     std::vector<border::Outgoing> out;
   };
@@ -146,6 +148,7 @@ class Cluster {
   Done work(WorldId w, border::WorldCore& core, balance::Balancer* balancer, const Piece& piece, Costs& costs,
             Usage& usage) const;
   void look(WorldId w);
+  void hold(WorldId w, double seconds);
   void hand_over(WorldId w, std::vector<border::Outgoing> out);
 
   const border::CoreSettings settings_;

@@ -16,6 +16,7 @@ enum BodyFlags : std::uint32_t {
   // Bits 4 to 6: the stiffness of contacts that its island was last solved with (physics/choices.h), 0 where none was
   // chosen.
   kStiffness = 1u << 4,
+  kInHeap = 1u << 7,  // so was its island, then
 };
 
 struct BodyState {

@@ -76,7 +76,7 @@ void check(const BodyState& body, const physics::Model& model) {
   if (!model.find(body.id)) throw CodecError(name(body.id) + ": not in the scene");
   if (!finite(body.position, 13)) throw CodecError(name(body.id) + ": not finite");
   if (!unit(body.orientation)) throw CodecError(name(body.id) + ": orientation is not a unit quaternion");
-  if (body.flags & ~std::uint32_t{kAsleep | 7u * kDriveReversed | 7u * kStiffness})
+  if (body.flags & ~std::uint32_t{kAsleep | 7u * kDriveReversed | 7u * kStiffness | kInHeap})
     throw CodecError(name(body.id) + ": unknown flags");
   if (body.stiffness() > physics::kMostSubstepLevel) throw CodecError(name(body.id) + ": stiffer than anything is");
 }

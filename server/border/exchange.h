@@ -36,7 +36,8 @@ struct Exchange {
       : parts(neighbourhood, step), told(links) {}
 
   std::vector<KeptIsland> kept;
-  std::size_t reached = 0;  // neighbours that had reached the step when it was last worked at
+  // Neighbours that had reached the step when its islands were last found, and tried.
+  std::size_t reached_when_found = 0, reached_when_tried = 0;
   bool retry = false;      // something has come since islands were last tried
   bool postponed = false;  // so it has, but not all neighbours have reached the step, and shared islands were left out
   bool part_due = true;    // this world's part may not be what was told

@@ -42,7 +42,7 @@ bool Settler::finding(Step step, bool all) {
   if (all) exchange.kept.clear();
   // An island that changes here may have been part of a larger one with others that are kept.
   exchange.part_due = exchange.part_stale = exchange.retry = true;
-  exchange.reached = context_.reached_by(step);
+  exchange.reached_when_found = context_.reached_by(step);
   find_threats(step);
   return !threats_.empty();
 }
@@ -98,16 +98,15 @@ void Settler::find_threats(Step step) {
     }
 }
 
-bool Settler::is_time(Step step) const {
+bool Settler::is_time(Step step, std::size_t before) const {
   const std::size_t reached = context_.reached_by(step);
-  return reached == context_.links.size() || step <= hurry_ ||
-         (reached > at(step).reached && !context_.next_for_some(step));
+  return reached == context_.links.size() || step <= hurry_ || (reached > before && !context_.next_for_some(step));
 }
 
 bool Settler::is_worth_doing(Step step) {
   if (context_.all_have_reached(step)) return true;
   timeline::Timeline& timeline = context_.timeline;
-  if (step < timeline.newest() && !is_time(step)) return false;
+  if (step < timeline.newest() && !is_time(step, at(step).reached_when_found)) return false;
   const std::span<const timeline::Slot> pending = timeline.pending(step);
   const auto known = deferred_.find(step);
   if (known != deferred_.end() && known->second == pending.size()) return false;
@@ -182,9 +181,9 @@ BodySet Settler::solve(BodySet island) {
 
 bool Settler::try_settle(Step step, const std::function<void(const BodySet&)>& settle) {
   Exchange& exchange = at(step);
-  if (!exchange.retry || !is_time(step)) return false;
+  if (!exchange.retry || !is_time(step, exchange.reached_when_tried)) return false;
   exchange.retry = false;
-  exchange.reached = context_.reached_by(step);
+  exchange.reached_when_tried = context_.reached_by(step);
   const bool all_there = context_.all_have_reached(step);
   exchange.postponed = !all_there;
   if (all_there) exchange.refresh_part(context_.settings.me, context_.settings.epoch, step);

@@ -34,10 +34,6 @@ class Settler {
   // Where those may be at `step` for whom its islands must wait.
   void find_threats(Step step);
 
-  // Whether it is time to work at a step again that not all neighbours have reached. Each look costs about as much as
-  // what it finds to do, so it waits until as many have reached the step as will soon, which is one look for all who
-  // keep pace, and one more for those who lag.
-  bool is_time(Step step) const;
   // Steps up to this one are worked at whenever there is anything to do: somebody waits to see it.
   void hurry(Step step) { hurry_ = std::max(hurry_, step); }
 
@@ -76,6 +72,10 @@ class Settler {
   void release_before(Step step);
 
  private:
+  // Whether it is time to work at a step again that not all neighbours have reached, when last `before` had. Each look
+  // costs about as much as what it finds to do, so it waits until as many have reached the step as will soon: one look
+  // for all who keep pace, and one more for those who lag.
+  bool is_time(Step step, std::size_t before) const;
   Exchange& at(Step step) { return exchanges_.at(static_cast<std::size_t>(step - base_)); }
   const Exchange& at(Step step) const { return exchanges_.at(static_cast<std::size_t>(step - base_)); }
   bool try_shared(Step step, KeptIsland& island, const std::function<void(const BodySet&)>& settle);

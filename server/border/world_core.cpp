@@ -132,16 +132,17 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // ---- work
-  Progress work() {
+  Progress work(bool patient) {
     if (!std::exchange(begun_, true)) observer_.finalised(0, Produced(timeline_, 0));
-    const bool worked = idle_ ? false : advance();
+    const bool worked = idle_ ? false : advance(patient);
     if (worked) changed();
     const Step final_before = final_;
     if (!idle_) finalise();
     const bool more_final = final_ != final_before;  // which is to be told, and gives room for more
     if (more_final) changed();
-    idle_ = !worked && !more_final;
+    idle_ = !worked && !more_final && !holding_;
     if (worked || more_final) return Progress::kWorked;
+    if (holding_) return Progress::kHolding;
     if (final_ == settings_.last_step && context_.near_final(final_)) return Progress::kDone;
     // Whoever lacks something from others must say so, wherever the clock may go.
     if (final_ < std::min(timeline_.newest(), closed_)) return Progress::kWaiting;
@@ -150,7 +151,8 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // The earliest step first, newer ones while nothing can be done there.
-  bool advance() {
+  bool advance(bool patient) {
+    holding_ = false;
     if (timeline_.unfinished() >= 0) {
       timeline_.finish();
       return true;
@@ -159,6 +161,10 @@ class WorldCore::Impl final : timeline::Arbiter {
     if (settings_.sync == Sync::kConservative) end = std::min(end, closed_);
     for (Step step = final_; step < end && step <= timeline_.newest(); ++step) {
       if (!may_process(step) || (step == timeline_.newest() && had_better_listen())) return false;
+      if (step == timeline_.newest() && patient && !context_.all_have_reached(step) && context_.all_are_near(step)) {
+        holding_ = true;
+        return false;
+      }
       if ((timeline_.has_pending(step) || step == timeline_.newest()) && settler_.is_worth_doing(step)) {
         if (step == timeline_.newest() && !context_.all_have_reached(step)) ++stats_.anticipated;
         timeline_.process(step);
@@ -437,6 +443,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   HeldBack held_back_;
   bool begun_ = false;
   bool idle_ = false;                  // nothing can be done before something comes
+  bool holding_ = false;               // a step could be begun, with some patience better than now
   bool untold_ = true;                 // something has changed since it was last looked at what to tell
   mutable std::optional<Step> front_;  // as long as nothing changes
   Neighbourhood neighbourhood_;
@@ -479,7 +486,7 @@ void WorldCore::tell_load(WorldId neighbour, const Load& load) {
   if (Link* const link = impl_->context_.link_to(neighbour)) link->add(load);
 }
 const std::map<WorldId, Load>& WorldCore::loads() const { return impl_->loads_; }
-Progress WorldCore::work() { return impl_->work(); }
+Progress WorldCore::work(bool patient) { return impl_->work(patient); }
 std::vector<Outgoing> WorldCore::take_outgoing() { return impl_->take_outgoing(); }
 Step WorldCore::clock() const { return impl_->timeline_.newest(); }
 Step WorldCore::front() const { return impl_->front(); }

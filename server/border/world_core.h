@@ -98,10 +98,16 @@ struct Outgoing {
 
 enum class Progress {
   kWorked,   // something was done; call again
+  kHolding,  // could begin a step that some neighbours are about to reach: call without patience when they have not
+             // soon
   kWaiting,  // nothing to do until a message comes
   kAtLimit,  // the clock is at the limit set by set_limit, or the next final step is not closed for actions
   kDone,     // last_step is final here, and every neighbour has said the same
 };
+
+// For how much of the time that a step takes it should be waited for news that are on their way, before a step is begun
+// without them. That is less than what doing the step in two pieces costs.
+constexpr double kPatienceShare = 0.25;
 
 class WorldCore {
  public:
@@ -148,8 +154,9 @@ class WorldCore {
   void tell_load(WorldId neighbour, const Load& load);  // with the next message
   const std::map<WorldId, Load>& loads() const;         // what neighbours told last
 
-  // ---- work: at most one step's worth, then returns
-  Progress work();
+  // ---- work: at most one step's worth, then returns. `patient`: does not begin a step for which news are on their
+  // way, from all neighbours who have not reached it (kHolding).
+  Progress work(bool patient = false);
 
   // ---- out: what has become ready to send since the last call, in order for each neighbour
   std::vector<Outgoing> take_outgoing();

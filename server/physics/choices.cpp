@@ -163,14 +163,19 @@ double Chooser::motion_wanted(const IslandView& island) const {
 Choice Chooser::choose(const IslandView& island) {
   if (constants_.substeps != 0) return {constants_.substeps, 0};
   std::uint32_t had = 0;
+  bool was_heap = false;
   deepest_ = 0;
-  for (const std::uint32_t i : island.bodies) had = std::max(had, island.states[i].stiffness());
+  for (const std::uint32_t i : island.bodies) {
+    had = std::max(had, island.states[i].stiffness());
+    was_heap = was_heap || (island.states[i].flags & kInHeap);
+  }
   const double wanted = stiffness_wanted(island);
   std::uint32_t stiffness = level_for(wanted);
   if (had > stiffness) stiffness = wanted < kSofterBelow * static_cast<double>(1u << had) ? had - 1 : had;
   // Where many bodies share each level, contacts do well that are stiffer than their sub-steps allow; a stack would
   // begin to sway, and so does what is heavy on what is light, which is why it wants more.
-  const bool heap = deepest_ > 0 && static_cast<double>(island.bodies.size()) > kHeapIsland * deepest_ &&
+  const double per_level = was_heap ? kStillHeap : kHeap;
+  const bool heap = deepest_ > 0 && static_cast<double>(island.bodies.size()) > per_level * deepest_ &&
                     stiffness > kLeastSubstepLevel && stiffness <= kMostHeapStiffness;
   const std::uint32_t least = heap ? stiffness - 1 : stiffness;
   return {1u << std::max(least, level_for(motion_wanted(island))), stiffness, heap};

@@ -340,7 +340,7 @@ void Stepper::solve(std::span<BodyState> bodies, std::span<ContactRecord> contac
     const auto members = islands.bodies_of(island);
     const auto touching = islands.contacts_of(island);
     const Grouped one{island, static_cast<std::uint32_t>(moving_used_), static_cast<std::uint32_t>(sorted_.size()),
-                      static_cast<std::uint32_t>(touching.size()), choice.stiffness};
+                      static_cast<std::uint32_t>(touching.size()), choice};
     moving_used_ += members.size();
     if (moving_used_ > moving_.size()) moving_.resize(std::max(moving_used_, 2 * moving_.size()));
     for (std::uint32_t k = 0; k < members.size(); ++k) {
@@ -427,7 +427,8 @@ void Stepper::finish(std::span<BodyState> bodies, std::span<ContactRecord> conta
   for (std::uint32_t k = 0; k < members.size(); ++k) {
     BodyState& state = bodies[members[k]];
     MovingBody& body = moving_[one.first_body + k];
-    state.set_stiffness(one.stiffness);
+    state.set_stiffness(one.choice.stiffness);
+    state.flags = (state.flags & ~std::uint32_t{kInHeap}) | (one.choice.heap ? std::uint32_t{kInHeap} : 0u);
     if (!end_step(body, constants_, state)) {
       ++counters.non_finite;
       finite = false;

@@ -99,7 +99,8 @@ class Stepper {
   Party party(const BodyState& state, std::uint32_t slot) const;
   Party party(const StaticModel& fixed) const;
   struct Grouped {  // an island that is solved together with others
-    std::uint32_t island, first_body, first_contact, contacts, stiffness;
+    std::uint32_t island, first_body, first_contact, contacts;
+    Choice choice;
   };
   struct Chosen {
     std::uint32_t island;

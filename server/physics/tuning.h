@@ -45,10 +45,11 @@ constexpr double kSagShare =
     0.1;  // of a body's smallest half extent, by which the contact that carries all above gives
 constexpr double kDepthRate = 60;  // 1/s; sub-steps per second and root of the contacts between a body and the ground
 constexpr double kSofterBelow = 0.4;  // contacts get softer again where less than this share of the sub-steps would do
-constexpr double kHeapIsland = 8;     // bodies per contact between the lowest and the highest: a heap, no stack
+constexpr double kHeap = 8;           // bodies per contact between the lowest and the highest: a heap, no stack;
+constexpr double kStillHeap = 4;      // it is one until there are less
 constexpr std::uint32_t kMostHeapStiffness = 3;  // for 8 sub-steps: beyond, loads are uneven
-constexpr double kTurnPerSubstep = 0.25;          // rad
-constexpr double kSagitta = 1e-4;                 // m; a body on a joint leaves its circle by this much in a sub-step
+constexpr double kTurnPerSubstep = 0.25;         // rad
+constexpr double kSagitta = 1e-4;                // m; a body on a joint leaves its circle by this much in a sub-step
 constexpr double kMostSubstepsForTravel = 8;
 
 // ---- joints: stiffer than contacts, since both signs of an impulse are allowed

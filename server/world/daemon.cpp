@@ -298,13 +298,20 @@ void Daemon::report_if_due(Clock::time_point now) {
   if (progress || now - status_at_ >= kStatusEvery) report_status(state_, now);
 }
 
-void Daemon::idle(Progress progress, std::chrono::milliseconds at_most) {
+Daemon::Clock::duration Daemon::patience() const {
+  const double step = seconds(working_) / static_cast<double>(std::max<Step>(1, core_->clock()));
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(border::kPatienceShare * step));
+}
+
+void Daemon::idle(Progress progress, Clock::duration at_most) {
   const auto before = Clock::now();
+  if (progress == Progress::kHolding) at_most = std::min(at_most, *holding_ + patience() - before);
+  if (at_most <= Clock::duration::zero()) return;
   if (progress == Progress::kWaiting && limit_known_ >= 0) ask_the_silent(before);
   transport_.wait(at_most);
   const auto passed = Clock::now() - before;
   if (state_ != wire::STATE_RUNNING) return;
-  if (progress == Progress::kWaiting) waiting_ += passed;
+  if (progress == Progress::kWaiting || progress == Progress::kHolding) waiting_ += passed;
   if (progress == Progress::kAtLimit) paced_ += passed;
 }
 
@@ -330,7 +337,11 @@ Daemon::End Daemon::run() {
     Progress progress = Progress::kWaiting;
     if (limit_known_ >= 0) {
       const Step front = core_->front();
-      progress = core_->work();
+      progress = core_->work(!holding_ || before - *holding_ < patience());
+      if (progress != Progress::kHolding)
+        holding_.reset();
+      else if (!holding_)
+        holding_ = before;
       if (balancer_) balance();
       send_all();
       open_lines();

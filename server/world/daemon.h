@@ -78,7 +78,8 @@ class Daemon {
   void ask_the_silent(Clock::time_point now);
   void report_if_due(Clock::time_point now);
   void report_status(std::uint8_t state, Clock::time_point now);
-  void idle(border::Progress progress, std::chrono::milliseconds at_most);
+  Clock::duration patience() const;
+  void idle(border::Progress progress, Clock::duration at_most);
   void act_all();
   void open_lines();
   soda::balance::Pace pace() const;
@@ -105,7 +106,8 @@ class Daemon {
   bool actions_came_ = false;
   std::atomic<double> pace_{0};
   std::atomic<bool> released_{false}, stopped_{false};
-  Step limit_known_ = -1;  // by the core
+  Step limit_known_ = -1;                     // by the core
+  std::optional<Clock::time_point> holding_;  // since when the core has waited for what is on its way
 
   std::uint8_t state_ = wire::STATE_PREPARING;
   Clock::time_point status_at_{};

@@ -16,7 +16,7 @@ namespace {
 using namespace soda::test;
 
 struct Totals {
-  std::uint64_t conservative = 0, lost = 0, doubled = 0, touched = 0;
+  std::uint64_t conservative = 0, lost = 0, doubled = 0, touched = 0, held = 0;
   soda::border::CoreStats stats;
 };
 
@@ -54,6 +54,7 @@ int main(int argc, char** argv) {
       }
       const std::lock_guard lock(mutex);
       totals.lost += result.lost, totals.doubled += result.doubled, totals.touched += result.touched;
+      totals.held += result.held;
       add(totals.stats, result.total);
       if (verbose) std::printf("seed %lu: %s\n", seed, text.c_str());
       if (!result.failure.empty()) {
@@ -77,6 +78,7 @@ int main(int argc, char** argv) {
       {"messages lost", totals.lost},
       {"messages doubled", totals.doubled},
       {"repairs of what had not changed", totals.touched},
+      {"times that a world waited for what was on its way", totals.held},
       {"steps anticipated", s.anticipated},
       {"rollbacks", s.timeline.steps_redone},
       {"results of bodies done again", s.timeline.bodies_redone},

@@ -148,7 +148,9 @@ class Session {
       }
       for (WorldId w = 0; w < cores_.size(); ++w) {
         if (uniform() < slowness_[w]) continue;
-        progress[w] = cores_[w]->work();
+        // In every other session worlds wait for what is on its way.
+        progress[w] = cores_[w]->work(network_.seed % 2 == 0 && !flights_.empty() && uniform() < 0.8);
+        result_.held += progress[w] == border::Progress::kHolding;
         moved = moved || progress[w] == border::Progress::kWorked;
         if (network_.touch_share > 0 && progress[w] == border::Progress::kWorked && uniform() < network_.touch_share &&
             !cores_[w]->is_indexed())
@@ -212,10 +214,11 @@ class Session {
     const double share = uniform() * uniform();
     for (const Body& body : scene_.bodies)
       if (uniform() < share) bodies.push_back(body.id);
+    const auto computed = core.stats().timeline.bodies_computed;
     core.touch(step, bodies);
     while (core.work() == border::Progress::kWorked) {
     }
-    ++result_.touched;
+    result_.touched += core.stats().timeline.bodies_computed > computed;  // it may wait for neighbours, too
     for (Step t = core.final_step(); t <= front; ++t)
       if (core.digest(t) != before[static_cast<std::size_t>(t - first)]) {
         result_.failure = "a repair of step " + std::to_string(step) + ", where nothing had changed, changed step " +

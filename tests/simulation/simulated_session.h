@@ -36,7 +36,7 @@ struct NetworkSettings {
 struct SessionResult {
   std::vector<StepDigest> steps;  // summed over the worlds, by step
   border::CoreStats total;        // likewise
-  std::uint64_t lost = 0, doubled = 0, delivered = 0, touched = 0;
+  std::uint64_t lost = 0, doubled = 0, delivered = 0, touched = 0, held = 0;
   std::size_t least_neighbours = 0;
   std::string failure;  // empty: all worlds made the last step final
 };
