@@ -2,7 +2,7 @@
 PRESET ?= release
 RUN_WORLDS ?= 4
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test configure build run test test-all test-asan test-tsan format
+.PHONY: help setup setup-test configure build run test test-all format
 
 help:            ## list the targets
 	@grep -hE '^[a-z-]+: .*##' $(MAKEFILE_LIST) | sed 's/: .*##/\t/' | expand -t 12
