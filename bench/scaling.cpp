@@ -358,8 +358,11 @@ void weak(const Size& size, const Network& network, int rounds, Yardstick& yards
   }
 }
 
+constexpr Step kWindow = border::CoreSettings{}.window;
+
 // The model against sessions of real processes, which share two cores and one memory. A step takes what a long session
-// takes more than a short one, so that start and first memory do not count.
+// takes more than a short one, so that the start does not count; and the short one is longer than the window, whose
+// memory is then used again.
 void check(const Scene& scene, const Size& size, const Options& options, Headline& headline, const Compared& compared) {
   const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 3;
   Csv table(options, "scaling_real", "worlds,real_step_ms,model_step_ms,real_cpu_ms,model_busy_ms");
@@ -369,7 +372,8 @@ void check(const Scene& scene, const Size& size, const Options& options, Headlin
   for (int round = 0; round < rounds; ++round)
     for (std::size_t i = 0; i < compared.size(); ++i) {
       const std::string arguments = "--worlds " + std::to_string(compared[i].first) + " --no-shm";
-      const SessionRun less = runs.run(arguments, size.steps), more = runs.run(arguments, 2 * size.steps);
+      const Step settled = kWindow + size.steps;
+      const SessionRun less = runs.run(arguments, settled), more = runs.run(arguments, settled + size.steps);
       wall[i].push_back((more.wall - less.wall) / steps);
       cpu[i].push_back((more.cpu - less.cpu) / steps);
     }
