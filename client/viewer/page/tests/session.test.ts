@@ -253,7 +253,8 @@ describe('the page and a world that dies', { skip: lacks ?? false }, () => {
     await page.waitForFunction(() => document.querySelectorAll('#panel .badge')[2]?.textContent === 'silent', null, limit);
     await page.waitForFunction(() => document.querySelectorAll('.row-name')[2]?.textContent === 'world 2 · silent', null, limit);
     assert.match(await page.locator('.trouble').innerText(), /world 2: silent/);
-    assert.deepEqual((await page.locator('#panel .badge').allInnerTexts()).slice(0, 2), ['running', 'running']);
+    // On a machine with too much to do these, too, are silent for a moment now and then.
+    await page.waitForFunction(() => [...document.querySelectorAll('#panel .badge')].map((b) => b.textContent).join() === 'running,running,silent', null, limit);
     assert.ok(await page.locator('#banner').isHidden());
     process.kill(pid, 'SIGKILL');
     const { code, output } = await session.ended();
