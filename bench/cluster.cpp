@@ -149,7 +149,6 @@ void Cluster::look(WorldId w) {
   bool more = true;
   while (more && !world.busy && !stopped_) {
     Piece piece = std::exchange(world.next, {});
-    piece.patient = std::exchange(world.patient, true);
     Done done = work(w, *world.core, world.balancer.get(), piece, costs_, world.usage);
     if (world.recorded) world.pieces.push_back(std::move(piece));
     more = done.progress == border::Progress::kWorked;
@@ -180,7 +179,7 @@ void Cluster::hold(WorldId w, double seconds) {
   at(now_ + seconds + border::kPatienceShare * step, [this, w, held = world.holds] {
     if (worlds_[w].holds != held) return;
     worlds_[w].holds = 0;
-    worlds_[w].patient = false;
+    worlds_[w].next.patient = false;
     look(w);
   });
 }

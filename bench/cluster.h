@@ -133,7 +133,7 @@ class Cluster {
     std::unique_ptr<border::WorldCore> core;
     std::unique_ptr<balance::Balancer> balancer;
     Piece next;  // what came while it was busy
-    bool busy = false, recorded = false, patient = true;
+    bool busy = false, recorded = false;
     std::uint64_t holds = 0;  // since when, by number; 0: not
     std::vector<Piece> pieces;
     double line_free = 0;  // when all that it has sent has left

@@ -367,15 +367,13 @@ void check(const Scene& scene, const Size& size, const Options& options, Headlin
   const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 3;
   Csv table(options, "scaling_real", "worlds,real_step_ms,model_step_ms,real_cpu_ms,model_busy_ms");
   const SessionRuns runs(scene);
-  const auto steps = static_cast<double>(size.steps);
   std::vector<std::vector<double>> wall(compared.size()), cpu(compared.size());
   for (int round = 0; round < rounds; ++round)
     for (std::size_t i = 0; i < compared.size(); ++i) {
       const std::string arguments = "--worlds " + std::to_string(compared[i].first) + " --no-shm";
-      const Step settled = kWindow + size.steps;
-      const SessionRun less = runs.run(arguments, settled), more = runs.run(arguments, settled + size.steps);
-      wall[i].push_back((more.wall - less.wall) / steps);
-      cpu[i].push_back((more.cpu - less.cpu) / steps);
+      const SessionRun step = runs.per_step(arguments, kWindow + size.steps, size.steps);
+      wall[i].push_back(step.wall);
+      cpu[i].push_back(step.cpu);
     }
   for (std::size_t i = 0; i < compared.size(); ++i) {
     const auto& [worlds, o] = compared[i];

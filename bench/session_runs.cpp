@@ -39,7 +39,15 @@ SessionRun SessionRuns::run(const std::string& arguments, Step steps) const {
       throw std::runtime_error("no " + key + " in the statistics of soda run");
     return std::stod(match[1]);
   };
-  return {number("wall_seconds"), number("cpu_seconds"), number("waiting_seconds"), number("mixed_islands"), number("bytes_sent")};
+  return {number("wall_seconds"), number("cpu_seconds"), number("waiting_seconds"), number("mixed_islands"),
+          number("bytes_sent")};
+}
+
+SessionRun SessionRuns::per_step(const std::string& arguments, Step settled, Step steps) const {
+  const SessionRun less = run(arguments, settled), more = run(arguments, settled + steps);
+  const auto each = [&](double SessionRun::*of) { return (more.*of - less.*of) / static_cast<double>(steps); };
+  return {each(&SessionRun::wall), each(&SessionRun::cpu), each(&SessionRun::waiting), each(&SessionRun::mixed_islands),
+          each(&SessionRun::bytes_sent)};
 }
 
 }  // namespace soda::bench

@@ -10,7 +10,7 @@
 namespace soda::bench {
 
 struct SessionRun {
-  double wall = 0, cpu = 0, waiting = 0;  // s; the last two summed over all worlds
+  double wall = 0, cpu = 0, waiting = 0;     // s; the last two summed over all worlds
   double mixed_islands = 0, bytes_sent = 0;  // summed over steps and worlds
 };
 
@@ -24,6 +24,8 @@ class SessionRuns {
 
   // Throws std::runtime_error where the run fails.
   SessionRun run(const std::string& arguments, Step steps) const;
+  // Of one step: what `steps` more than `settled` take, so that the start does not count.
+  SessionRun per_step(const std::string& arguments, Step settled, Step steps) const;
 
  private:
   std::filesystem::path folder_;

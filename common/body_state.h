@@ -30,6 +30,8 @@ struct BodyState {
 
   std::uint32_t stiffness() const { return flags / kStiffness & 7u; }
   void set_stiffness(std::uint32_t level) { flags = (flags & ~(7u * kStiffness)) | level * kStiffness; }
+  bool in_heap() const { return (flags & kInHeap) != 0; }
+  void set_in_heap(bool in) { flags = (flags & ~std::uint32_t{kInHeap}) | (in ? std::uint32_t{kInHeap} : 0u); }
   bool asleep() const { return (flags & kAsleep) != 0; }
   Vec3 x() const { return Vec3(position[0], position[1], position[2]); }
   Quat q() const { return Quat(orientation[3], orientation[0], orientation[1], orientation[2]); }

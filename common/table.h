@@ -39,9 +39,11 @@ class Table {
     assign(std::span(&item, 1));
   }
 
-  // Sets all `items`, ascending by slot, and takes their references. Cheaper than one by one: what is replaced in a
-  // shared page is not even looked at.
+  // Sets all `items`, each slot once, and takes their references; leaves them ascending by slot. Cheaper than one by
+  // one: what is replaced in a shared page is not even looked at.
   void assign(std::span<Item> items) {
+    const auto before = [](const Item& l, const Item& r) { return l.first < r.first; };
+    if (!std::is_sorted(items.begin(), items.end(), before)) std::sort(items.begin(), items.end(), before);
     for (std::size_t first = 0, end = 0; first < items.size(); first = end) {
       const auto page_number = static_cast<Slot>(items[first].first / kPageSlots);
       while (end < items.size() && static_cast<Slot>(items[end].first / kPageSlots) == page_number) ++end;

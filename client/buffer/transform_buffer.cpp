@@ -76,7 +76,6 @@ void TransformBuffer::change(Poses& poses, const wire::Transforms& sample) {
     items_.emplace_back(bodies_.of(sample.ids()[i]), std::move(pose));
   }
   for (const BodyId id : sample.gone()) items_.emplace_back(bodies_.of(id), Ref<Pose>());
-  std::sort(items_.begin(), items_.end(), [](const auto& l, const auto& r) { return l.first < r.first; });
   poses.assign(items_);
 }
 

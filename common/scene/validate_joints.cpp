@@ -58,8 +58,8 @@ MaybeProblem ends_problem(const Scene& scene, const Joint& joint) {
   if (b && !b->is_static && joint.b < joint.a) return Problem{"body_b", "must have a higher id than body_a"};
   if (a->motion && (!b || b->is_static || b->motion)) return Problem{"", "neither of its bodies can be moved by it"};
   // Nothing but a distance and a ball joint without limits does without turning one of its bodies.
-  const bool turns = joint.kind != JointKind::kDistance &&
-                     (joint.kind != JointKind::kBall || joint.limits || joint.cone_limit);
+  const bool turns =
+      joint.kind != JointKind::kDistance && (joint.kind != JointKind::kBall || joint.limits || joint.cone_limit);
   if (turns && !can_turn(*a) && (!b || !can_turn(*b)))
     return Problem{"", "neither of its bodies can be turned by it (fixed_rotation)"};
   const Vec3 place_a = (a->pose * joint.frame_a).position;

@@ -37,11 +37,6 @@ struct Context {
     return std::any_of(links.begin(), links.end(),
                        [&](const Link& link) { return !link.reached(step) && link.reached(step - 1); });
   }
-  // Whether all neighbours that have not reached the step have reached the one before.
-  bool all_are_near(Step step) const {
-    return std::all_of(links.begin(), links.end(),
-                       [&](const Link& link) { return link.reached(std::max(step - 1, link.since())); });
-  }
   // State `step` is final here and with every neighbour: nothing that is known of it can change.
   bool near_final(Step step) const {
     return final_step >= step &&

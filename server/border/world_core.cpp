@@ -161,7 +161,8 @@ class WorldCore::Impl final : timeline::Arbiter {
     if (settings_.sync == Sync::kConservative) end = std::min(end, closed_);
     for (Step step = final_; step < end && step <= timeline_.newest(); ++step) {
       if (!may_process(step) || (step == timeline_.newest() && had_better_listen())) return false;
-      if (step == timeline_.newest() && patient && !context_.all_have_reached(step) && context_.all_are_near(step)) {
+      if (step == timeline_.newest() && patient && !context_.all_have_reached(step) &&
+          context_.all_have_reached(step - 1)) {
         holding_ = true;
         return false;
       }

@@ -167,7 +167,7 @@ Choice Chooser::choose(const IslandView& island) {
   deepest_ = 0;
   for (const std::uint32_t i : island.bodies) {
     had = std::max(had, island.states[i].stiffness());
-    was_heap = was_heap || (island.states[i].flags & kInHeap);
+    was_heap = was_heap || island.states[i].in_heap();
   }
   const double wanted = stiffness_wanted(island);
   std::uint32_t stiffness = level_for(wanted);

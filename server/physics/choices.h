@@ -22,7 +22,7 @@ struct Choice {
   // the sub-steps themselves allow, where the scene says how many those are.
   std::uint32_t stiffness = 0;
   // A heap, solved in half of those sub-steps. Its contacts are softer than said by a root of two: fully as stiff,
-  // boxes in it would swing against each other for ever. Remembered, too.
+  // boxes in it would swing against each other for a quarter of a minute. Remembered, too.
   bool heap = false;
   // Stiffness in steps of a root of two; 0 as above.
   std::uint32_t half_octaves() const { return 2 * stiffness - (heap ? 1 : 0); }

@@ -141,13 +141,11 @@ void Model::add_dynamic(const Scene& scene, const Body& body) {
   m.is_ball = children == 1 && only.kind == ShapeKind::kSphere && only.pose.position.isZero(0);
   m.drive = body.drive ? &*body.drive : nullptr;
   m.fixed_rotation = body.fixed_rotation;
-  if (m.fixed_rotation) {
-    m.inverse_inertia.setZero();
-    m.isotropic = true;
-  }
   if (body.motion) {
     m.kinematic = &body;
     m.inverse_mass = 0;
+  }
+  if (body.motion || body.fixed_rotation) {
     m.inverse_inertia.setZero();
     m.isotropic = true;
   }

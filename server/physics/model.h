@@ -34,7 +34,7 @@ struct BodyModel {
   double inner_extent = 0;          // m, smallest half extent of any child: the scale for recycling contacts
   double inverse_inner_extent = 0;  // 1/m
   bool is_ball = false;             // a sphere about its centre of mass, which looks the same however it turns
-  bool fixed_rotation = false;    // nothing turns it: its inverse inertia is 0
+  bool fixed_rotation = false;      // nothing turns it: its inverse inertia is 0
   const Drive* drive = nullptr;
   const Body* kinematic = nullptr;  // one with a prescribed motion; its inverse mass and inertia are 0
   CollisionFilter filter;

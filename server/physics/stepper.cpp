@@ -428,7 +428,7 @@ void Stepper::finish(std::span<BodyState> bodies, std::span<ContactRecord> conta
     BodyState& state = bodies[members[k]];
     MovingBody& body = moving_[one.first_body + k];
     state.set_stiffness(one.choice.stiffness);
-    state.flags = (state.flags & ~std::uint32_t{kInHeap}) | (one.choice.heap ? std::uint32_t{kInHeap} : 0u);
+    state.set_in_heap(one.choice.heap);
     if (!end_step(body, constants_, state)) {
       ++counters.non_finite;
       finite = false;

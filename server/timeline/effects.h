@@ -56,7 +56,7 @@ class Effects {
 
   const physics::Model& model_;
   std::map<Step, std::map<BodyId, std::vector<Effect>>> by_step_;  // in the log's order
-  std::vector<Held> held_;                                       // likewise
+  std::vector<Held> held_;                                         // likewise
 };
 
 }  // namespace soda::timeline

@@ -77,8 +77,7 @@ const Record* Timeline::known(Step step, Slot slot) const {
 BodySet Timeline::all_produced(Step step) const {
   std::vector<const Record*> records;
   at(step).produced.for_each([&](Slot, const Ref<Record>& record) { records.push_back(record.get()); });
-  std::sort(records.begin(), records.end(),
-            [](const Record* l, const Record* r) { return l->body.id < r->body.id; });
+  std::sort(records.begin(), records.end(), [](const Record* l, const Record* r) { return l->body.id < r->body.id; });
   BodySet set;
   for (const Record* const record : records) {
     set.bodies.push_back(record->body);
@@ -359,8 +358,6 @@ void Timeline::take_acted(Step step, Slot slot, const BodyState& body, std::span
 // New records of bodies produced at `step`.
 void Timeline::store(Step step, std::vector<Table<Record>::Item>& items) {
   if (items.empty()) return;
-  const auto before = [](const auto& l, const auto& r) { return l.first < r.first; };
-  if (!std::is_sorted(items.begin(), items.end(), before)) std::sort(items.begin(), items.end(), before);
   Entry& entry = at(step);
   std::uint64_t redone = 0;
   for (const auto& [slot, record] : items) {

@@ -208,7 +208,6 @@ void Timeline::sort_out(Step step, bool all) {
     for (const std::uint32_t i : members) island_items_.emplace_back(around_[i], island);
     if (wait) keep(step, k, std::move(island));
   }
-  std::sort(island_items_.begin(), island_items_.end(), [](const auto& l, const auto& r) { return l.first < r.first; });
   entry.islands.assign(island_items_);
 }
 

@@ -305,7 +305,7 @@ Daemon::Clock::duration Daemon::patience() const {
 
 void Daemon::idle(Progress progress, Clock::duration at_most) {
   const auto before = Clock::now();
-  if (progress == Progress::kHolding) at_most = std::min(at_most, *holding_ + patience() - before);
+  if (progress == Progress::kHolding) at_most = std::min(at_most, *hold_until_ - before);
   if (at_most <= Clock::duration::zero()) return;
   if (progress == Progress::kWaiting && limit_known_ >= 0) ask_the_silent(before);
   transport_.wait(at_most);
@@ -337,11 +337,11 @@ Daemon::End Daemon::run() {
     Progress progress = Progress::kWaiting;
     if (limit_known_ >= 0) {
       const Step front = core_->front();
-      progress = core_->work(!holding_ || before - *holding_ < patience());
+      progress = core_->work(!hold_until_ || before < *hold_until_);
       if (progress != Progress::kHolding)
-        holding_.reset();
-      else if (!holding_)
-        holding_ = before;
+        hold_until_.reset();
+      else if (!hold_until_)
+        hold_until_ = before + patience();
       if (balancer_) balance();
       send_all();
       open_lines();

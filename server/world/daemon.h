@@ -106,8 +106,8 @@ class Daemon {
   bool actions_came_ = false;
   std::atomic<double> pace_{0};
   std::atomic<bool> released_{false}, stopped_{false};
-  Step limit_known_ = -1;                     // by the core
-  std::optional<Clock::time_point> holding_;  // since when the core has waited for what is on its way
+  Step limit_known_ = -1;                        // by the core
+  std::optional<Clock::time_point> hold_until_;  // while the core waits for what is on its way
 
   std::uint8_t state_ = wire::STATE_PREPARING;
   Clock::time_point status_at_{};
