@@ -15,6 +15,7 @@ using namespace std::chrono_literals;
 constexpr auto kPoll = 50ms;
 constexpr auto kEndAtMost = 15s;  // for daemons to end by themselves once the session is over
 constexpr auto kStopAtMost = 5s;  // for daemons to end when asked to
+constexpr auto kLongStart = 10s;  // without a word of the session
 constexpr auto kGoneAfter = 15s;  // for a session that was not started here
 constexpr auto kLastWords = 3s;   // for reports under way, once every daemon has ended
 
@@ -31,10 +32,18 @@ class Follower {
 
   int run() {
     const bool own = processes_.running() > 0;
-    auto last_end = Clock::now();
+    const auto began = Clock::now();
+    auto last_end = began;
+    bool known = false;  // or said that it is not
     for (;;) {
       hear();
       collector_.tick();
+      if (!known && (collector_.session() || Clock::now() - began > kLongStart)) {
+        known = true;
+        if (!collector_.session())
+          table_.say(own ? "nothing has been heard of the worlds for 10 s; still waiting (-v shows what they say)"
+                         : "nothing has been heard of this session for 10 s; still waiting");
+      }
       if (!collector_.difference().empty()) return kExitDifferent;
       if (collector_.complete()) return let_end();
       if (signals_.received() != 0) return 128 + signals_.received();

@@ -18,9 +18,9 @@ struct NetworkOptions {
   std::string discovery_server;  // HOST:PORT of a fast-discovery-server with id 0; "": simple discovery
   std::uint32_t domain = 0;      // DDS domain
   // s. A process that was silent for longer is taken for gone and must be discovered again. Well above the longest
-  // pause expected; a silent world is noticed faster, by its missing Status (kSilence in topics.h). Not shorter, for each
-  // time that Fast DDS 2.9 looks whether somebody's lease has ended, which it does about once a lease, it aborts if that
-  // one is just leaving (an assertion in PDP::check_remote_participant_liveliness).
+  // pause expected; a silent world is noticed faster, by its missing Status (kSilence in topics.h). Not shorter, for
+  // each time that Fast DDS 2.9 looks whether somebody's lease has ended, which it does about once a lease, it aborts
+  // if that one is just leaving (an assertion in PDP::check_remote_participant_liveliness).
   double lease = 30;
 };
 

@@ -1,16 +1,7 @@
 #include "common/dds/participant.h"
 
-#include <arpa/inet.h>
-#include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
-#include <fastrtps/utils/IPFinder.h>
-#include <fastrtps/utils/IPLocator.h>
-#include <fcntl.h>
 #include <spdlog/spdlog.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -28,7 +19,6 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <filesystem>
 #include <iterator>
 #include <map>
 #include <mutex>
@@ -40,6 +30,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/dds/network_qos.h"
 #include "common/dds/shm_cleanup.h"
 
 namespace soda::dds {
@@ -50,14 +41,6 @@ using eprosima::fastrtps::Duration_t;
 using eprosima::fastrtps::types::ReturnCode_t;
 
 namespace {
-
-constexpr std::uint32_t kShmSegment = 16u << 20;  // bytes; by default 512 KiB, in which 1 MiB takes 12 ms, not 1.1 ms
-// ms. By default a port of shared memory whose reader did not move for a second is taken for dead, and what comes of
-// that when the reader had only been stopped may be a port that nobody hears. What the dead leave behind is found by
-// its locks.
-constexpr std::uint32_t kShmPatience = 3600 * 1000;
-constexpr std::uint32_t kSocketBuffer = 4u << 20;  // bytes
-constexpr double kAnnouncePeriod = 1;              // s, at most; how long two that lost each other take to meet again
 
 Duration_t duration(double seconds) {
   return {static_cast<std::int32_t>(seconds), static_cast<std::uint32_t>(std::fmod(seconds, 1) * 1e9)};
@@ -79,87 +62,6 @@ void route_log_once() {
     fdds::Log::RegisterConsumer(std::make_unique<ToSpdlog>());
     fdds::Log::SetVerbosity(fdds::Log::Kind::Error);
   });
-}
-
-void set_transports(const NetworkOptions& options, fdds::DomainParticipantQos& qos) {
-  using namespace eprosima::fastdds::rtps;
-  qos.transport().use_builtin_transports = false;
-  if (options.shared_memory) {
-    auto shm = std::make_shared<SharedMemTransportDescriptor>();
-    shm->segment_size(kShmSegment);
-    shm->healthy_check_timeout_ms(kShmPatience);
-    qos.transport().user_transports.push_back(shm);
-  }
-  auto udp = std::make_shared<UDPv4TransportDescriptor>();
-  udp->sendBufferSize = kSocketBuffer;
-  udp->receiveBufferSize = kSocketBuffer;
-  if (options.interface == "local") {
-    udp->interfaceWhiteList.emplace_back("127.0.0.1");  // otherwise discovery goes out on every interface
-  } else if (options.interface != "all") {
-    in_addr address{};
-    if (inet_pton(AF_INET, options.interface.c_str(), &address) != 1)
-      throw std::invalid_argument("--interface: neither 'local', 'all' nor an IPv4 address: " + options.interface);
-    udp->interfaceWhiteList.push_back(options.interface);
-  }
-  qos.transport().user_transports.push_back(udp);
-}
-
-// Where Fast DDS starts to look for free ports. By default every process starts at 0 and so takes over, in shared
-// memory, the port of one that was just killed; those that knew the dead one keep writing to its memory, which nobody
-// reads. So: an id whose ports have left no trace there, if there is one.
-int fresh_participant_id(int domain) {
-  constexpr int kIds = 110;  // the next domain's ports begin at 120
-  const int start = static_cast<int>(getpid() % kIds);
-  const auto taken = [&](int id) {
-    std::error_code error;  // where one cannot look, nothing is taken
-    for (const int port : {7410 + 250 * domain + 2 * id, 7411 + 250 * domain + 2 * id})
-      if (std::filesystem::exists("/dev/shm/fastrtps_port" + std::to_string(port), error)) return true;
-    return false;
-  };
-  for (int i = 0; i < kIds; ++i)
-    if (const int id = (start + i) % kIds; !taken(id)) return id;
-  return start;
-}
-
-// Held while a process chooses its id and takes the ports that go with it: of several that start at once, two would
-// choose the same.
-class IdLock {
- public:
-  IdLock() : file_(::open("/dev/shm/soda-participants.lock", O_CREAT | O_RDONLY | O_CLOEXEC, 0666)) {
-    if (file_ >= 0) (void)::flock(file_, LOCK_EX);
-  }
-  ~IdLock() {
-    if (file_ >= 0) ::close(file_);
-  }
-  IdLock(const IdLock&) = delete;
-  IdLock& operator=(const IdLock&) = delete;
-
- private:
-  int file_;  // -1 where there is none to be had: then it is as without
-};
-
-void set_discovery(const NetworkOptions& options, fdds::DomainParticipantQos& qos) {
-  auto& config = qos.wire_protocol().builtin.discovery_config;
-  config.leaseDuration = duration(options.lease);
-  config.leaseDuration_announcementperiod = duration(std::min(kAnnouncePeriod, options.lease / 4));
-  if (options.discovery_server.empty()) return;
-  const std::size_t colon = options.discovery_server.rfind(':');
-  int port = 0;
-  if (colon != std::string::npos) port = std::atoi(options.discovery_server.c_str() + colon + 1);
-  const std::string host = options.discovery_server.substr(0, colon);
-  if (port <= 0 || port > 65535)
-    throw std::invalid_argument("--discovery-server: not HOST:PORT: " + options.discovery_server);
-  const auto [v4, v6] = frtps::IPLocator::resolveNameDNS(host);
-  in_addr literal{};
-  const bool is_address = inet_pton(AF_INET, host.c_str(), &literal) == 1;
-  if (!is_address && v4.empty()) throw std::invalid_argument("--discovery-server: unknown host: " + host);
-  frtps::Locator_t locator(LOCATOR_KIND_UDPv4, static_cast<std::uint32_t>(port));
-  frtps::IPLocator::setIPv4(locator, is_address ? host : *v4.begin());
-  eprosima::fastdds::rtps::RemoteServerAttributes server;
-  server.ReadguidPrefix("44.53.00.5f.45.50.52.4f.53.49.4d.41");  // of `fast-discovery-server -i 0`
-  server.metatrafficUnicastLocatorList.push_back(locator);
-  config.discoveryProtocol = frtps::DiscoveryProtocol_t::CLIENT;
-  config.m_DiscoveryServers.push_back(server);
 }
 
 // The same for the QoS of writers and of readers.
@@ -353,16 +255,14 @@ Participant::Participant(const NetworkOptions& options, const std::string& sessi
     : impl_(std::make_unique<Impl>()) {
   route_log_once();
   impl_->session = session;
-  fdds::DomainParticipantQos qos;
+  fdds::DomainParticipantQos qos = network_qos(options);
   qos.name(name);
-  set_transports(options, qos);
-  std::unique_ptr<IdLock> lock;
+  std::unique_ptr<PortsLock> lock;
   if (options.shared_memory) {
     remove_stale_shm();
-    lock = std::make_unique<IdLock>();
-    qos.wire_protocol().participant_id = fresh_participant_id(static_cast<int>(options.domain));
+    lock = std::make_unique<PortsLock>();
+    qos.wire_protocol().participant_id = fresh_participant_id(options.domain);
   }
-  set_discovery(options, qos);
   impl_->participant = fdds::DomainParticipantFactory::get_instance()->create_participant(
       options.domain, qos, impl_.get(), fdds::StatusMask::none());
   lock.reset();

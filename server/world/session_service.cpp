@@ -14,7 +14,8 @@ namespace {
 constexpr std::chrono::milliseconds kTick{5};  // of a paced run: finer than a frame of any display
 constexpr double kTellAgain = 0.5;             // s that a world may lack entries of the log that were told
 constexpr std::size_t kTellAtOnce = 256;       // of those, again
-constexpr double kLogMissingEvery = 5;                // s, while worlds are missing
+constexpr double kLogMissingEvery = 5;         // s, while worlds are missing
+constexpr double kWarnMissing = 10;            // s after which that is strange where all were started together
 constexpr double kJoining = 60;                // s that a daemon may take to load the scene and say so
 constexpr double kGone = 120;                  // s of silence after which a running world will not come back
 constexpr double kPause = 2;                   // s between two looks at the clock: this process stood still
@@ -33,8 +34,9 @@ SessionService::SessionService(const wire::Session& session, std::shared_ptr<con
       seats_(session.worlds()),
       pacer_(session.pace() / session.dt(), session.window(), session.lead(), session.last_step()),
       desk_(session.instance(), std::move(scene), std::move(actions)),
-      next_log_(seconds_now() + kLogMissingEvery),
-      looked_(seconds_now()) {
+      began_(seconds_now()),
+      next_log_(began_ + kLogMissingEvery),
+      looked_(began_) {
   seats_[0].nonce = session.instance();
   seats_[0].holder = "this process";
   seats_[0].heard = seconds_now();
@@ -217,8 +219,9 @@ void SessionService::log_missing(double now) {
     else if (seats_[i].state < wire::STATE_READY || silent(seats_[i], now))
       unready += " " + std::to_string(i);
   }
-  if (!missing.empty()) spdlog::info("waiting for worlds to join:{}", missing);
-  if (!unready.empty()) spdlog::info("waiting for worlds to get ready:{}", unready);
+  const auto level = now - began_ < kWarnMissing ? spdlog::level::info : spdlog::level::warn;
+  if (!missing.empty()) spdlog::log(level, "waiting for worlds to join:{}", missing);
+  if (!unready.empty()) spdlog::log(level, "waiting for worlds to get ready:{}", unready);
 }
 
 wire::Control SessionService::next(double now) {

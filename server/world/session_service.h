@@ -84,6 +84,7 @@ class SessionService {
   std::vector<wire::LogEntry> entries_;  // to be told now
   std::vector<wire::Answer> answers_;    // likewise
   std::uint8_t phase_ = wire::PHASE_GATHERING;
+  const double began_;  // s, as all times here
   double next_log_ = 0;
   double looked_ = 0;  // s, time of the last next()
   bool news_ = false;  // since run() looked

@@ -141,6 +141,26 @@ TEST_P(Given, SameBitsAsOneWorld) {
 
 INSTANTIATE_TEST_SUITE_P(Sample, Given, testing::ValuesIn(scene_names()), [](const auto& one) { return one.param; });
 
+// Worlds that balance their loads by themselves.
+TEST(Given, ByTheBalancer) {
+  std::uint64_t transfers = 0, handed_over = 0, sessions = 0;
+  for (const std::string& name : scene_names()) {
+    const Reference& expected = reference(name);
+    const Step steps = hard_scene(name).steps;
+    for (const std::uint64_t seed : {41, 42}) {
+      NetworkSettings network = network_of(seed);
+      network.budget = seed % 2 ? -1 : 1e-6 * static_cast<double>(expected.scene.bodies.size()) / 4;
+      const SessionResult got = run_session(expected.scene, 4, steps, network, slabs(expected.scene, 4));
+      expect_equal(expected, got, steps);
+      transfers += got.total.transfers;
+      handed_over += got.total.timeline.handed_over;
+      ++sessions;
+    }
+  }
+  EXPECT_GT(transfers, sessions);
+  EXPECT_GT(handed_over, 0u);
+}
+
 // News of a transfer must have gone all the way along a row of worlds before anybody there computes its step, the one
 // furthest ahead, too. (Once a world eight neighbours away was ahead of them, and refused them for ever.)
 TEST(Given, AlongRowsOfWorlds) {

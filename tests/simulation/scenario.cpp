@@ -116,6 +116,9 @@ Scenario scenario_of(std::uint64_t seed) {
   if (const auto kind = random() % 6; kind >= 2)
     s.actions = random_actions(scene, s.steps, 1 + random() % 12, kind >= 4, seed);
   if (seed % 2 == 0) s.transfers = random_transfers(scene, s.worlds, s.owner, s.steps, seed);
+  // Half of the time a step takes no longer than there is for it, if all have the same to do.
+  if (seed % 8 == 1 || seed % 8 == 7)
+    s.network.budget = seed % 16 < 8 ? -1 : 1e-6 * static_cast<double>(scene.bodies.size()) / s.worlds;
   if (seed % 8 == 3 || seed % 8 == 5) s.network.give_share = seed % 16 < 8 ? 0.002 : 0.05;
   return s;
 }
@@ -129,7 +132,8 @@ std::string Scenario::text() const {
          share(network.stall_share) + ", touched " + share(network.touch_share) + ", lead " +
          std::to_string(network.lead) + ", " + std::to_string(actions.size()) + " actions, " +
          std::to_string(transfers.size()) + " transfers" +
-         (network.give_share > 0 ? ", cells given " + share(network.give_share) : "");
+         (network.give_share > 0 ? ", cells given " + share(network.give_share) : "") +
+         (network.budget != 0 ? ", balanced" : "");
 }
 
 SessionResult run_scenario(const Scenario& s) {

@@ -16,7 +16,7 @@ namespace {
 using namespace soda::test;
 
 struct Totals {
-  std::uint64_t conservative = 0, lost = 0, doubled = 0, touched = 0, held = 0;
+  std::uint64_t conservative = 0, lost = 0, doubled = 0, touched = 0, held = 0, balanced = 0;
   soda::border::CoreStats stats;
 };
 
@@ -48,6 +48,7 @@ int main(int argc, char** argv) {
         text = scenario.text();
         result = run_scenario(scenario);
         const std::lock_guard lock(mutex);
+        if (scenario.network.budget != 0) totals.balanced += result.total.cells_given;
         totals.conservative += scenario.network.sync == soda::border::Sync::kConservative;
       } catch (const std::exception& e) {
         result.failure = e.what();
@@ -88,6 +89,7 @@ int main(int argc, char** argv) {
       {"bodies that changed worlds", s.arrived},
       {"bodies handed over with their cells", s.timeline.handed_over},
       {"cells given while it ran", s.cells_given},
+      {"of those, by worlds that balance their loads", totals.balanced},
       {"offers of cells declined", s.offers_declined},
       {"links opened while it ran", s.links_opened},
       {"wide bodies told", s.wide_bodies},

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/state_hash.h"
+#include "server/balance/balancer.h"
 #include "server/physics/model.h"
 #include "server/physics/stepper.h"
 #include "server/timeline/effects.h"
@@ -126,10 +127,13 @@ class Session {
                                                                                 .sync = network.sync,
                                                                                 .window = network.window,
                                                                                 .transfers = transfers,
-                                                                                .balance = network.give_share > 0,
+                                                                                .balance = trades(network),
                                                                                 .actions = true},
                                                            digests_[w]));
       slowness_[w] = uniform() * network.stall_share;
+      if (network.budget == 0) continue;
+      balancers_.push_back(std::make_unique<balance::Balancer>(*cores_[w], map_.grid, w, scene.dt));
+      burdens_.emplace_back();
     }
     for (const auto& core : cores_) result_.least_neighbours += core->neighbours().size();
   }
@@ -158,6 +162,7 @@ class Session {
         if (network_.touch_share > 0 && progress[w] != border::Progress::kWorked && uniform() < network_.touch_share)
           if (!touch(*cores_[w])) return fail(result_.failure);
         if (network_.give_share > 0) trade(*cores_[w]);
+        if (network_.budget != 0) balance(w);
         for (border::Outgoing& out : cores_[w]->take_outgoing()) post(now, out);
       }
       const bool done = std::all_of(progress.begin(), progress.end(),
@@ -187,6 +192,7 @@ class Session {
   }
 
  private:
+  static bool trades(const NetworkSettings& network) { return network.give_share > 0 || network.budget != 0; }
   double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
 
   // Some cells to some neighbour, which mostly takes them.
@@ -200,6 +206,17 @@ class Session {
     for (std::uint32_t cell = 0; cell < map_.grid.cells(); ++cell)
       if (core.may_give(cell) && trade_random_() % one_in == 0) cells.push_back(cell);
     core.give(taker, std::move(cells));
+  }
+
+  // Bodies cost each world something else, which changes now and then.
+  void balance(WorldId w) {
+    Burden& burden = burdens_[w];
+    if (trade_random_() % 300 == 0) burden.each = std::vector<double>{1e-6, 2e-6, 8e-6}[trade_random_() % 3];
+    const std::uint64_t computed = cores_[w]->stats().timeline.bodies_computed;
+    balancers_[w]->worked(burden.each * static_cast<double>(computed - std::exchange(burden.computed, computed)));
+    Step displayed = cores_[w]->final_step();
+    for (const auto& core : cores_) displayed = std::min(displayed, core->final_step());
+    balancers_[w]->consider({std::max(0.0, network_.budget), displayed});
   }
 
   // A repair of what has not changed must leave every step as it is, byte by byte.
@@ -271,6 +288,12 @@ class Session {
   std::vector<Digests> digests_;
   std::vector<std::unique_ptr<physics::Model>> models_;
   std::vector<std::unique_ptr<border::WorldCore>> cores_;
+  struct Burden {
+    double each = 1e-6;  // s for a body
+    std::uint64_t computed = 0;
+  };
+  std::vector<std::unique_ptr<balance::Balancer>> balancers_;
+  std::vector<Burden> burdens_;
   std::vector<double> slowness_;
   Service service_;
   std::priority_queue<Flight> flights_;

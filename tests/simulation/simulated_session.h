@@ -31,6 +31,9 @@ struct NetworkSettings {
   Step lead = 4;               // steps beyond the slowest final one up to which the session closes actions
   double touch_share = 0;      // of ticks in which a world at rest repairs a random step where nothing has changed
   double give_share = 0;       // of ticks in which a world offers some of its cells to a neighbour
+  // Worlds balance their loads, as daemons do, with made-up costs; 0: they do not. Otherwise s that a step may take, or
+  // less than 0: as fast as possible. A body takes 1 us at first.
+  double budget = 0;
 };
 
 struct SessionResult {
