@@ -19,7 +19,8 @@ configure: setup ## configure build/$(PRESET)
 build: configure ## build into build/$(PRESET), programs in build/$(PRESET)/bin
 	@cmake --build --preset $(PRESET)
 
-run: build       ## the demo: a small city on 4 world daemons
+run: configure   ## the demo: a small city on 4 world daemons (builds no tests)
+	@cmake --build --preset $(PRESET) --target programs
 	@scripts/demo.sh build/$(PRESET)/bin $(RUN_WORLDS)
 
 test: setup-test build ## unit, simulation and distributed tests, and the sanitizers' sample (what CI runs)

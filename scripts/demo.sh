@@ -9,10 +9,14 @@ viewer=
 trap 'rm -rf "$folder"; [ -z "$viewer" ] || kill "$viewer" 2>/dev/null || true' EXIT
 "$bin/soda" scene make demo --bodies "$bodies" --seed 1 -o "$folder/demo.scene"
 if [ -e "$bin/../share/soda/viewer/index.html" ]; then
-  "$bin/soda" view --session "$session" --port "$port" &
-  viewer=$!
-  sleep 1  # it says where it is to be seen, above the table
+  view() { "$bin/soda" view --session "$session" --port "$1" & viewer=$!; sleep 1; }  # it says where, above the table
+  view "$port"
+  if ! kill -0 "$viewer" 2>/dev/null; then
+    echo "the viewer did not start at port $port: trying another one"
+    view 0
+  fi
 else
   echo "the viewer's page was not built (no Node.js 18): the demo is shown here only"
 fi
+echo "the session's name: $session (soda status --session $session, and so on)"
 "$bin/soda" run "$folder/demo.scene" --session "$session" --worlds "$worlds" --steps 100000000 --pace realtime

@@ -80,7 +80,13 @@ int run(RunOptions& options) {
   }
   signals.on_stop(nullptr);
   options.follow.substeps = scene.substeps;
-  return launch(options, scene, log_of(options.actions, scene), signals);
+  const std::vector<LoggedAction> log = log_of(options.actions, scene);
+  const auto late =
+      std::count_if(log.begin(), log.end(), [&](const auto& entry) { return entry.step > options.steps; });
+  if (late > 0)
+    std::fprintf(stderr, "warning: %s: %td actions are for steps after %lld, the last one, and will not be done\n",
+                 options.actions.c_str(), late, static_cast<long long>(options.steps));
+  return launch(options, scene, log, signals);
 }
 
 }  // namespace
@@ -88,6 +94,9 @@ int run(RunOptions& options) {
 void add_run_command(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand("run", "simulate a scene on several worlds of this machine");
+  command->footer(
+      "Exit code: 0 when the last step is final everywhere; 1 if a world or a report failed; 2 if the scene, a file or\n"
+      "an option is wrong; 128 + N if signal N ended it (130 after Ctrl-C).");
   command->add_option("scene", o->scene, "scene file (.scene, .txtpb, .sdf, .world)")->required();
   command->add_option("--session", o->session, "name of the session; a new one each time if not given");
   command

@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -28,6 +29,8 @@ struct ViewOptions {
   std::string page;  // folder; "": where the build has put it
   dds::NetworkOptions network;
 };
+
+constexpr std::chrono::seconds kLongWait{10};  // for a session
 
 std::string random_token() {
   std::random_device device;
@@ -68,11 +71,20 @@ int view(ViewOptions options) {
   StopSignals signals;
   const viewer::StaticFiles files(page_of(options));
   const auto gateway = open(options, files, "session '" + options.session + "'", false);
+  const auto began = std::chrono::steady_clock::now();
+  bool waited = false;     // and said so
   std::int64_t after = 0;  // sessions of this name follow one another
   while (signals.received() == 0) {
     viewer::LiveSource source(options.network, options.session,
                               {.history = options.history, .on_news = [&] { gateway->wake(); }, .after = after});
-    gateway->run(source, [&] { return signals.received() != 0 || source.superseded(); });
+    gateway->run(source, [&] {
+      if (!waited && (source.ready() || std::chrono::steady_clock::now() - began > kLongWait)) {
+        waited = true;
+        if (!source.ready()) std::printf("no session '%s' has been heard of yet; waiting\n", options.session.c_str());
+        std::fflush(stdout);
+      }
+      return signals.received() != 0 || source.superseded();
+    });
     after = source.next();
   }
   return kExitOk;

@@ -186,6 +186,8 @@ MaybeProblem motion_problem(const Body& body, double max_speed) {
   if (auto p = coordinates("motion.velocity", motion.velocity)) return p;
   if (auto p = coordinates("motion.amplitude", motion.amplitude)) return p;
   if (auto p = in_range("motion.frequency", motion.frequency, 0, kMaxFrequency, " Hz")) return p;
+  if (motion.frequency == 0 && motion.amplitude != Vec3::Zero())
+    return Problem{"motion.frequency", "must be positive where there is an amplitude, is 0"};
   if (auto p = in_range("motion.phase", motion.phase, -100, 100, " rad")) return p;
   if (auto p = length_in_range("motion.angular_velocity", motion.angular_velocity, kMaxSpin, " rad/s")) return p;
   const double fastest = motion.velocity.norm() + 2 * std::numbers::pi * motion.frequency * motion.amplitude.norm() +

@@ -31,12 +31,13 @@ bool earlier(const Transfer& l, const Transfer& r) {
 
 }  // namespace
 
-Territories::Territories(const TerritoryMap& initial)
+Territories::Territories(const TerritoryMap& initial, std::span<const Transfer> transfers)
     : grid_(initial.grid), worlds_(initial.worlds), known_(initial.worlds, 0) {
   Version& first = versions_.emplace_back();
   first.owner = initial.owner;
   first.sole.resize(first.owner.size());
   make_sole(first, {});
+  for (const Transfer& transfer : transfers) add(transfer);
 }
 
 const Territories::Version& Territories::at(Step step) const {

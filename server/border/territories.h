@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@ struct Transfer {
 
 class Territories {
  public:
-  explicit Territories(const TerritoryMap& initial);
+  // `transfers`: that are known from the start.
+  explicit Territories(const TerritoryMap& initial, std::span<const Transfer> transfers = {});
 
   const Grid& grid() const { return grid_; }
   WorldId worlds() const { return worlds_; }

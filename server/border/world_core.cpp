@@ -9,6 +9,7 @@
 
 #include "common/state_hash.h"
 #include "server/border/announcer.h"
+#include "server/border/closings.h"
 #include "server/border/context.h"
 #include "server/border/credible.h"
 #include "server/border/held_back.h"
@@ -22,9 +23,10 @@ class WorldCore::Impl final : timeline::Arbiter {
  public:
   Impl(physics::Model& model, const TerritoryMap& map, const CoreSettings& settings, Observer& observer)
       : model_(model),
-        territories_(with(map, settings.transfers)),
+        territories_(map, settings.transfers),
         settings_(settings),
         observer_(observer),
+        closings_(settings.actions),
         neighbourhood_(model, territories_, settings.me),
         links_(make_links()),
         context_{model_, settings_, neighbourhood_, timeline_, links_, stats_, final_},
@@ -35,7 +37,6 @@ class WorldCore::Impl final : timeline::Arbiter {
     for (const Link& link : links_) neighbours_.push_back(link.peer());
     timeline_.stepper().timing = settings.measure;
     final_ = 0;  // the scene
-    closed_ = settings.actions ? 0 : std::numeric_limits<Step>::max();
   }
 
   // ---- what comes in
@@ -97,7 +98,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   // ---- actions
   bool act(const LoggedAction& action) {
     if (action.number != logged_ + 1) return false;
-    if (action.step <= std::max(closed_, final_))
+    if (action.step <= std::max(closings_.closed(), final_))
       throw ProtocolError("action " + std::to_string(action.number) + " is for step " + std::to_string(action.step) +
                           ", which is closed");
     if (const auto* spawn = std::get_if<Spawn>(&action.action)) {
@@ -109,26 +110,15 @@ class WorldCore::Impl final : timeline::Arbiter {
     ++logged_;
     ++stats_.actions;
     settler_.reconsider();
+    closings_.release(logged_);
     changed();
-    close();
     held_back_.release(logged_, [&](const auto& bytes) { (void)receive(bytes); });  // refusals are counted
     return true;
   }
 
   void close_actions(Step step, ActionNumber logged) {
-    if (closings_.empty() || closings_.back().second != logged) closings_.emplace_back(0, logged);
-    closings_.back().first = std::max(closings_.back().first, step);
-    close();
-  }
-
-  void close() {
-    const Step before = closed_;
-    std::erase_if(closings_, [&](const auto& closing) {
-      if (closing.second > logged_) return false;
-      closed_ = std::max(closed_, closing.first);
-      return true;
-    });
-    if (closed_ != before) changed();
+    closings_.add(step, logged);
+    if (closings_.release(logged_)) changed();
   }
 
   // ---- work
@@ -145,9 +135,10 @@ class WorldCore::Impl final : timeline::Arbiter {
     if (holding_) return Progress::kHolding;
     if (final_ == settings_.last_step && context_.near_final(final_)) return Progress::kDone;
     // Whoever lacks something from others must say so, wherever the clock may go.
-    if (final_ < std::min(timeline_.newest(), closed_)) return Progress::kWaiting;
+    if (final_ < std::min(timeline_.newest(), closings_.closed())) return Progress::kWaiting;
     const bool limited = timeline_.newest() >= limit_ && limit_ < settings_.last_step;
-    return limited || (final_ >= closed_ && final_ < settings_.last_step) ? Progress::kAtLimit : Progress::kWaiting;
+    return limited || (final_ >= closings_.closed() && final_ < settings_.last_step) ? Progress::kAtLimit
+                                                                                     : Progress::kWaiting;
   }
 
   // The earliest step first, newer ones while nothing can be done there.
@@ -158,7 +149,7 @@ class WorldCore::Impl final : timeline::Arbiter {
       return true;
     }
     Step end = std::min({settings_.last_step, limit_, final_ + settings_.window});
-    if (settings_.sync == Sync::kConservative) end = std::min(end, closed_);
+    if (settings_.sync == Sync::kConservative) end = std::min(end, closings_.closed());
     for (Step step = final_; step < end && step <= timeline_.newest(); ++step) {
       if (!may_process(step) || (step == timeline_.newest() && had_better_listen())) return false;
       if (step == timeline_.newest() && patient && !context_.all_have_reached(step) &&
@@ -184,7 +175,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   bool had_better_listen() const {
     constexpr Step kNearly = 8;
     return settings_.window > 2 * kNearly && timeline_.newest() + kNearly >= final_ + settings_.window &&
-           final_ < std::min(timeline_.newest(), closed_) && !links_.empty();
+           final_ < std::min(timeline_.newest(), closings_.closed()) && !links_.empty();
   }
 
   bool may_process(Step step) const {
@@ -280,7 +271,8 @@ class WorldCore::Impl final : timeline::Arbiter {
     for (const Link& link : links_)
       text += "world " + std::to_string(link.peer()) + ": upto " + std::to_string(link.upto()) + ", final " +
               std::to_string(link.final_step()) + ", near final " + std::to_string(link.near_final()) + "; ";
-    if (closed_ <= final_) text += "actions are closed up to step " + std::to_string(closed_) + "; ";
+    if (closings_.closed() <= final_)
+      text += "actions are closed up to step " + std::to_string(closings_.closed()) + "; ";
     if (timeline_.unfinished() == final_) text += "a round is not finished; ";
     if (timeline_.has_pending(final_)) text += std::to_string(timeline_.pending(final_).size()) + " bodies to do; ";
     return text + settler_.why_not_final(final_);
@@ -306,12 +298,6 @@ class WorldCore::Impl final : timeline::Arbiter {
 
  private:
   friend class WorldCore;
-
-  static Territories with(const TerritoryMap& map, const std::vector<Transfer>& transfers) {
-    Territories territories(map);
-    for (const Transfer& transfer : transfers) territories.add(transfer);
-    return territories;
-  }
 
   Link make_link(WorldId world, std::size_t index) const {
     Link link(settings_.session, settings_.me, settings_.epoch, world, index);
@@ -400,7 +386,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   // State t + 1 is final when state t is final here and with every neighbour, nothing of step t is to be done, and all
   // that others have told for it is final.
   void finalise() {
-    while (final_ < std::min(timeline_.newest(), closed_) && context_.near_final(final_) &&
+    while (final_ < std::min(timeline_.newest(), closings_.closed()) && context_.near_final(final_) &&
            !timeline_.has_pending(final_) && timeline_.unfinished() != final_ && settler_.all_final(final_))
       make_final(final_ + 1);
   }
@@ -439,8 +425,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   std::string refusal_;
   Step final_ = -1, near_final_ = -1, limit_ = std::numeric_limits<Step>::max();
   ActionNumber logged_ = 0;
-  Step closed_;                                          // no action comes for steps up to this one
-  std::vector<std::pair<Step, ActionNumber>> closings_;  // that presuppose entries of the log which have not come yet
+  Closings closings_;
   HeldBack held_back_;
   bool begun_ = false;
   bool idle_ = false;                  // nothing can be done before something comes

@@ -219,7 +219,9 @@ void SessionService::log_missing(double now) {
     else if (seats_[i].state < wire::STATE_READY || silent(seats_[i], now))
       unready += " " + std::to_string(i);
   }
-  const auto level = now - began_ < kWarnMissing ? spdlog::level::info : spdlog::level::warn;
+  const bool warn = !warned_ && now - began_ >= kWarnMissing;
+  warned_ = warned_ || warn;
+  const auto level = warn ? spdlog::level::warn : spdlog::level::info;
   if (!missing.empty()) spdlog::log(level, "waiting for worlds to join:{}", missing);
   if (!unready.empty()) spdlog::log(level, "waiting for worlds to get ready:{}", unready);
 }

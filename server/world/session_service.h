@@ -86,8 +86,9 @@ class SessionService {
   std::uint8_t phase_ = wire::PHASE_GATHERING;
   const double began_;  // s, as all times here
   double next_log_ = 0;
-  double looked_ = 0;  // s, time of the last next()
-  bool news_ = false;  // since run() looked
+  bool warned_ = false;  // that worlds are missing
+  double looked_ = 0;    // s, time of the last next()
+  bool news_ = false;    // since run() looked
   bool quit_ = false;
   std::thread thread_;
 };

@@ -135,9 +135,9 @@ constexpr double kThroughTowers = 6;
 
 INSTANTIATE_TEST_SUITE_P(
     Sample, Equality,
-    ::testing::Values(Case{"cubes", 1000, {1, 2, 3, 8}}, Case{"piles", 432, {2, 4}, 2, 2, kThrough16Piles},
-                      Case{"heap", 400, {3, 4}, 2, 4}, Case{"towers", 400, {2, 4, 8}, 2, kNever, kThroughTowers},
-                      Case{"city", 1000, {2, 3, 4}}, Case{"dominoes", 600, {2, 8}}, Case{"cluster", 320, {4, 8}},
+    ::testing::Values(Case{"cubes", 1000, {1, 3, 8}}, Case{"piles", 432, {2, 4}, 2, 2, kThrough16Piles},
+                      Case{"heap", 400, {3, 4}, 2, 4}, Case{"towers", 400, {4, 8}, 2, kNever, kThroughTowers},
+                      Case{"city", 1000, {2, 4}}, Case{"dominoes", 600, {2, 8}}, Case{"cluster", 320, {8}},
                       Case{"machines", 240, {2, 4}}, Case{"nested.sdf", 0, {2, 3}, kNever, kNever}),
     name_of);
 

@@ -144,7 +144,7 @@ INSTANTIATE_TEST_SUITE_P(Sample, Given, testing::ValuesIn(scene_names()), [](con
 // Worlds that balance their loads by themselves.
 TEST(Given, ByTheBalancer) {
   std::uint64_t transfers = 0, handed_over = 0, sessions = 0;
-  for (const std::string& name : scene_names()) {
+  for (const char* const name : {"corner", "sleeping_chain", "fast_bodies"}) {  // light: `simulate` does all
     const Reference& expected = reference(name);
     const Step steps = hard_scene(name).steps;
     for (const std::uint64_t seed : {41, 42}) {
@@ -195,14 +195,16 @@ TEST(WideBodies, AreToldToEveryWorldTheyReach) {
   const SessionResult got = run_session(expected.scene, 8, 150, {});
   expect_equal(expected, got, 150);
   EXPECT_GT(got.total.wide_bodies, 0u);
-  EXPECT_GT(got.total.parts_sent, got.total.syncs);  // parts of others were passed on
+  EXPECT_GT(got.total.parts_passed, 0u);
+  EXPECT_GT(got.total.parts_left, 0u);
 }
 
 // A part came from others, with word that it is final, and then from its origin itself. (Once that word was forgotten
-// then, and not passed on to a third world, which stood still. One seed of ten thousand met that; if what seeds mean
-// changes, this one is an ordinary session.)
+// then, and not passed on to a third world, which stood still. One seed of ten thousand met that. Since each part is
+// passed on by one world only, this seed does not meet it any more, nor did any of 1,500 others without the mend.)
 TEST(WideBodies, APartOnceFinalStaysSo) {
-  const Scenario scenario = scenario_of(6049);
+  Scenario scenario = scenario_of(6049);
+  scenario.network.budget = 0;  // as it was then
   EXPECT_EQ(scenario.scene, "wide_bodies") << "seeds mean something else now: without the mend, which one fails?";
   EXPECT_EQ(run_scenario(scenario).failure, "");
 }
@@ -210,7 +212,8 @@ TEST(WideBodies, APartOnceFinalStaysSo) {
 // Word that a part is final was lost on its way from a neighbour that is not behind itself. (Once only those who were
 // behind were asked again, and all stood still for ever.)
 TEST(LostMessages, AreAskedForOfAllNeighbours) {
-  const Scenario scenario = scenario_of(10455);
+  Scenario scenario = scenario_of(10455);
+  scenario.network.budget = 0;  // as it was then
   EXPECT_EQ(scenario.scene, "sleeping_chain") << "seeds mean something else now: without the mend, which one fails?";
   const SessionResult got = run_scenario(scenario);
   EXPECT_EQ(got.failure, "");

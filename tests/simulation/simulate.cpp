@@ -88,11 +88,13 @@ int main(int argc, char** argv) {
       {"islands mixed", s.mixed_islands},
       {"bodies that changed worlds", s.arrived},
       {"bodies handed over with their cells", s.timeline.handed_over},
-      {"cells given while it ran", s.cells_given},
-      {"of those, by worlds that balance their loads", totals.balanced},
+      {"cells given while it ran, at random", s.cells_given - totals.balanced},
+      {"cells given by worlds that balance their loads", totals.balanced},
       {"offers of cells declined", s.offers_declined},
       {"links opened while it ran", s.links_opened},
       {"wide bodies told", s.wide_bodies},
+      {"parts passed on", s.parts_passed},
+      {"times that passing one on was left to somebody else", s.parts_left},
   };
   bool all = true;
   for (const auto& [what, count] : happened) {

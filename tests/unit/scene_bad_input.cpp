@@ -57,6 +57,8 @@ const BadInput kBad[] = {
     {"MotionOfAStatic", "body { name: \"b\" static: true " BOX "\n motion {} }", B7, "motion", "does not move"},
     {"MotionWithVelocity", "body { name: \"b\" " BOX "motion {}\n linear_velocity { x: 1 } }", B7, "linear_velocity",
      "motion says it"},
+    {"MotionWithoutFrequency", "body { name: \"b\" " BOX "\n motion { amplitude { x: 1 } } }", B7, "motion.frequency",
+     "where there is an amplitude"},
     {"MotionTooFast", "body { name: \"b\" " BOX "\n motion { amplitude { x: 100 } frequency: 1 } }", B7, "motion",
      "reaches 628.319 m/s"},
     {"NanMotion", "body { name: \"b\" " BOX "motion {\n phase: nan } }", B7, "motion.phase", "finite"},

@@ -9,6 +9,7 @@ const limit = 60_000; // ms
 export class Socket {
   private readonly socket: WebSocket;
   private readonly waiting = new Map<number, (answer: Answer) => void>();
+  private readonly welcomed: Promise<void>;
   private next = 1;
   mayAct: boolean | null = null; // as Welcome has said
 
@@ -19,15 +20,23 @@ export class Socket {
     gateway.protocol = 'ws:';
     gateway.search = address.search;
     this.socket = new WebSocket(gateway);
-    this.socket.on('message', (data: Buffer) => {
-      const { what } = fromBinary(ToPageSchema, new Uint8Array(data));
-      if (what.case === 'welcome') this.mayAct = what.value.mayAct;
-      if (what.case === 'answer') this.waiting.get(what.value.number)?.(what.value);
+    this.welcomed = new Promise((resolve, reject) => {
+      const timer = setTimeout(() => reject(new Error('no welcome')), limit);
+      this.socket.on('message', (data: Buffer) => {
+        const { what } = fromBinary(ToPageSchema, new Uint8Array(data));
+        if (what.case === 'answer') this.waiting.get(what.value.number)?.(what.value);
+        if (what.case !== 'welcome') return;
+        this.mayAct = what.value.mayAct;
+        clearTimeout(timer);
+        resolve();
+      });
     });
   }
 
+  // Until it is welcomed, which may be some time after the connection is open.
   async open(): Promise<void> {
     await once(this.socket, 'open', { signal: AbortSignal.timeout(limit) });
+    await this.welcomed;
   }
 
   ask(what: Do['what']): Promise<Answer> {
