@@ -294,8 +294,6 @@ Scene city(std::uint32_t bodies) {
   return scene;
 }
 
-// By number of worlds: what the model says of few of them, which real ones can be compared with.
-using Compared = std::vector<std::pair<WorldId, Outcome>>;
 // On as many worlds as weak scaling ends with: of the same bodies.
 using Common = std::vector<std::pair<Mode, Outcome>>;
 
@@ -305,7 +303,7 @@ std::string key(const std::string& what, WorldId worlds, const Mode& mode) {
 }
 
 void strong(const Scene& scene, const Size& size, const Network& network, int rounds, Yardstick& yardstick,
-            Tables& tables, Headline& headline, Compared& compared, Common& common) {
+            Tables& tables, Headline& headline, Common& common) {
   double one = 0;
   for (const WorldId worlds : size.strong) {
     Experiment experiment(scene, worlds, size.steps, rounds, yardstick);
@@ -317,7 +315,6 @@ void strong(const Scene& scene, const Size& size, const Network& network, int ro
       tables.add("strong", mode, worlds, size.bodies, o, one);
       headline.add(key("city.efficiency", worlds, mode), efficiency(o));
       headline.add(key("city.waiting_share", worlds, mode), 1 - o.busy_mean / o.step);
-      if (worlds <= 4 && mode.sync == border::Sync::kAnticipative) compared.emplace_back(worlds, o);
       if (worlds != size.common()) continue;
       common.emplace_back(mode, o);
       headline.add(key("city.more_work", worlds, mode), o.busy_mean * worlds / one);
@@ -360,30 +357,43 @@ void weak(const Size& size, const Network& network, int rounds, Yardstick& yards
 
 constexpr Step kWindow = border::CoreSettings{}.window;
 
-// The model against sessions of real processes, which share two cores and one memory. A step takes what a long session
-// takes more than a short one, so that the start does not count; and the short one is longer than the window, whose
-// memory is then used again.
-void check(const Scene& scene, const Size& size, const Options& options, Headline& headline, const Compared& compared) {
+// The model against sessions of real processes, which share two cores and one memory. Both by what a long session takes
+// more than a short one: so the start does not count, and the steps are the same (later ones cost something else). The
+// short one is longer than the window, whose memory is then used again.
+void check(const Scene& scene, const Size& size, const Network& network, const Options& options, Yardstick& yardstick,
+           Headline& headline) {
+  constexpr WorldId kWorlds[] = {1, 2, 4};
+  constexpr std::size_t kCases = std::size(kWorlds);
   const int rounds = options.rounds > 0 ? options.rounds : options.quick ? 1 : 3;
+  const Step settled = kWindow + size.steps;
   Csv table(options, "scaling_real", "worlds,real_step_ms,model_step_ms,real_cpu_ms,model_busy_ms");
   const SessionRuns runs(scene);
-  std::vector<std::vector<double>> wall(compared.size()), cpu(compared.size());
+  std::vector<double> wall[kCases], cpu[kCases];
   for (int round = 0; round < rounds; ++round)
-    for (std::size_t i = 0; i < compared.size(); ++i) {
-      const std::string arguments = "--worlds " + std::to_string(compared[i].first) + " --no-shm";
-      const SessionRun step = runs.per_step(arguments, kWindow + size.steps, size.steps);
+    for (std::size_t i = 0; i < kCases; ++i) {
+      const SessionRun step =
+          runs.per_step("--no-shm --balance off --worlds " + std::to_string(kWorlds[i]), settled, size.steps);
       wall[i].push_back(step.wall);
       cpu[i].push_back(step.cpu);
     }
-  for (std::size_t i = 0; i < compared.size(); ++i) {
-    const auto& [worlds, o] = compared[i];
-    const double step = median(wall[i]), all_cpu = median(cpu[i]), busy = o.busy_mean * worlds;
-    table.row(worlds, 1e3 * step, 1e3 * o.step, 1e3 * all_cpu, 1e3 * busy);
+  for (std::size_t i = 0; i < kCases; ++i) {
+    const WorldId worlds = kWorlds[i];
+    const auto model = [&](Step steps) {
+      return Experiment(scene, worlds, steps, rounds, yardstick).run(kAnticipative, network);
+    };
+    const Outcome less = model(settled), more = model(settled + size.steps);
+    const auto each = [&](double Outcome::*of) {
+      return (more.*of * static_cast<double>(settled + size.steps) - less.*of * static_cast<double>(settled)) /
+             static_cast<double>(size.steps);
+    };
+    const double step = median(wall[i]), all_cpu = median(cpu[i]);
+    const double model_step = each(&Outcome::step), busy = each(&Outcome::busy_mean) * worlds;
+    table.row(worlds, 1e3 * step, 1e3 * model_step, 1e3 * all_cpu, 1e3 * busy);
     std::printf("%u real worlds: %.1f ms per step (model %.1f), %.1f ms of CPU (model %.1f)\n", worlds, 1e3 * step,
-                1e3 * o.step, 1e3 * all_cpu, 1e3 * busy);
+                1e3 * model_step, 1e3 * all_cpu, 1e3 * busy);
     const std::string end = "_" + std::to_string(worlds);
     // More worlds than there are cores say nothing of the time.
-    if (worlds <= 2) headline.add("model_over_real.step" + end, o.step / step);
+    if (worlds <= 2) headline.add("model_over_real.step" + end, model_step / step);
     headline.add("model_over_real.cpu" + end, busy / all_cpu);
     if (worlds == 2) headline.add("city.real_efficiency_2", median(wall[0]) / step / 2);
   }
@@ -433,13 +443,12 @@ void scaling(const Options& options, Headline& headline) {
   Yardstick yardstick;
   Tables tables(options);
   const Scene whole = city(size.bodies);
-  Compared compared;
   Common common;
-  strong(whole, size, network, rounds, yardstick, tables, headline, compared, common);
+  strong(whole, size, network, rounds, yardstick, tables, headline, common);
   weak(size, network, rounds, yardstick, tables, headline, common);
   tables.close();
   plot(options, "scaling", kPicture, 1000, 440);
-  check(whole, size, options, headline, compared);
+  check(whole, size, network, options, yardstick, headline);
 }
 
 }  // namespace soda::bench

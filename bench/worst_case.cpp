@@ -32,7 +32,7 @@ Scene block(int across) {
 
 constexpr const char* kPicture = R"(
 set datafile missing NaN  # so that lines go on across the rows of other worlds
-set key center left
+set key below
 set xlabel 'bodies in one island'
 set ylabel 'against one world'
 set yrange [0:*]
