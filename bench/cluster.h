@@ -79,6 +79,20 @@ class MeasuredCosts final : public Costs {
   double since_ = 0;
 };
 
+// As much for each body computed, and nothing else.
+class BodyCosts final : public Costs {
+ public:
+  double per_body = 0;  // s
+  void begin(const border::WorldCore& core) override { computed_ = core.stats().timeline.bodies_computed; }
+  double spent(WorldId, const border::WorldCore& core, Activity activity, double) override {
+    if (activity != Activity::kWorking) return 0;
+    return per_body * static_cast<double>(core.stats().timeline.bodies_computed - computed_);
+  }
+
+ private:
+  std::uint64_t computed_ = 0;
+};
+
 class Cluster {
  public:
   // As far as a session lets a world go (WorldCore::set_limit, close_actions).

@@ -105,20 +105,6 @@ Step lasts_in_core(double cost) {
   return shown;
 }
 
-// As much for each body.
-class BodyCosts final : public Costs {
- public:
-  double per_body = 0;  // s
-  void begin(const border::WorldCore& core) override { computed_ = core.stats().timeline.bodies_computed; }
-  double spent(WorldId, const border::WorldCore& core, Activity activity, double) override {
-    if (activity != Activity::kWorking) return 0;
-    return per_body * static_cast<double>(core.stats().timeline.bodies_computed - computed_);
-  }
-
- private:
-  std::uint64_t computed_ = 0;
-};
-
 // One world that has all bodies, in a square with three idle neighbours; `cost` as above is for all of them together.
 struct Balanced {
   Step steps = 0;  // shown on time, of kMostSteps

@@ -24,17 +24,11 @@ Scene two_groups() {
   return builder.finish();
 }
 
-class ByTheBody final : public Costs {
- public:
-  void begin(const border::WorldCore& core) override { before_ = core.stats().timeline.bodies_computed; }
-  double spent(WorldId, const border::WorldCore& core, Activity activity, double) override {
-    if (activity != Activity::kWorking) return 0;
-    return kEach * static_cast<double>(core.stats().timeline.bodies_computed - before_);
-  }
-
- private:
-  std::uint64_t before_ = 0;
-};
+BodyCosts by_the_body() {
+  BodyCosts costs;
+  costs.per_body = kEach;
+  return costs;
+}
 
 class ModelOfACluster : public testing::Test {
  protected:
@@ -66,7 +60,7 @@ class ModelOfACluster : public testing::Test {
     return end;
   }
 
-  ByTheBody costs_;
+  BodyCosts costs_ = by_the_body();
   double computed_ = 0;  // s, when all had done the last step
   std::unique_ptr<Cluster> cluster_;
 };
@@ -119,7 +113,7 @@ TEST_F(ModelOfACluster, MessagesTakeTheirTimeOfTheProcessorAndOfTheLine) {
 
 TEST_F(ModelOfACluster, ARecordedWorldDoesTheSameAgain) {
   (void)run(2, border::Sync::kAnticipative, {.latency = 1, .send_seconds = 0.5});
-  ByTheBody again;
+  BodyCosts again = by_the_body();
   const Cluster::Usage replayed = cluster_->replay(1, again);
   EXPECT_EQ(replayed.pieces, cluster_->usage(1).pieces);
   EXPECT_EQ(replayed.seconds, cluster_->usage(1).seconds);

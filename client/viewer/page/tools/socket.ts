@@ -35,8 +35,7 @@ export class Socket {
 
   // Until it is welcomed, which may be some time after the connection is open.
   async open(): Promise<void> {
-    await once(this.socket, 'open', { signal: AbortSignal.timeout(limit) });
-    await this.welcomed;
+    await Promise.all([once(this.socket, 'open', { signal: AbortSignal.timeout(limit) }), this.welcomed]);
   }
 
   ask(what: Do['what']): Promise<Answer> {
