@@ -151,7 +151,8 @@ class Session {
         ++result_.delivered;
       }
       for (WorldId w = 0; w < cores_.size(); ++w) {
-        if (uniform() < slowness_[w]) continue;
+        // Nobody stalls while everything is at rest: it is a standstill only where all have had their turn.
+        if (uniform() < slowness_[w] && now - idle_since <= patience / 2) continue;
         // In every other session worlds wait for what is on its way.
         progress[w] = cores_[w]->work(network_.seed % 2 == 0 && !flights_.empty() && uniform() < 0.8);
         result_.held += progress[w] == border::Progress::kHolding;
