@@ -47,7 +47,9 @@ struct Exchange {
   MixedIslands parts;  // of all origins, this world included
   std::uint32_t revisions = 0;
   std::uint64_t part_content = 0;
-  std::vector<std::optional<std::uint64_t>> told;  // by link: the content of the part that it was told
+  // By link: the revision of the part that it was told. (Not its content: one that has become again what it was may
+  // have been told to others in between, who pass on that one, and word that it is final.)
+  std::vector<std::optional<std::uint32_t>> told;
   struct Passed {
     Revision revision;
     bool final = false;

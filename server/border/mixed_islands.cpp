@@ -26,7 +26,12 @@ bool MixedIslands::put(Part part) {
     const Component& component = *part.components[i];
     indexed.hashes.push_back(component_hash(component));
     for (const BodyState& body : component.set.bodies) indexed.holder.emplace(body.id, i);
-    for (const Port& port : component.ports) indexed.port_users.emplace(port.body, i);
+    std::vector<WorldId>& touched = indexed.touched.emplace_back();
+    for (const Port& port : component.ports) {
+      indexed.port_users.emplace(port.body, i);
+      if (std::find(touched.begin(), touched.end(), port.owner) == touched.end()) touched.push_back(port.owner);
+    }
+    indexed.touched_by_any.insert(touched.begin(), touched.end());
   }
   indexed.part = std::move(part);
   parts_.insert_or_assign(origin, std::move(indexed));
@@ -99,6 +104,23 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
   closure.worlds.assign(used.begin(), used.end());
   closure.missing.assign(missing.begin(), missing.end());
   return closure;
+}
+
+bool MixedIslands::touches(WorldId world, WorldId other) const {
+  const auto it = parts_.find(world);
+  return it != parts_.end() && it->second.touched_by_any.contains(other);
+}
+
+bool MixedIslands::touches_both(const Closure& island, WorldId world, WorldId one, WorldId other) const {
+  const auto it = parts_.find(world);
+  if (it == parts_.end()) return false;
+  const auto has = [](const std::vector<WorldId>& worlds, WorldId w) {
+    return std::find(worlds.begin(), worlds.end(), w) != worlds.end();
+  };
+  for (auto key = std::lower_bound(island.components.begin(), island.components.end(), Key{world, 0});
+       key != island.components.end() && key->origin == world; ++key)
+    if (const auto& touched = it->second.touched[key->component]; has(touched, one) && has(touched, other)) return true;
+  return false;
 }
 
 std::optional<BodySet> MixedIslands::assemble(const Closure& closure, std::string& misfit) const {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <unordered_map>
 #include <vector>
@@ -51,6 +52,11 @@ class MixedIslands {
   // Everything that component leads to, as far as the parts at hand go.
   Closure close(Key from) const;
 
+  // By its part at hand, whether that world touches a body of `other`, and so tells it its part itself.
+  bool touches(WorldId world, WorldId other) const;
+  // Whether one of its components in `island` touches bodies of both.
+  bool touches_both(const Closure& island, WorldId world, WorldId one, WorldId other) const;
+
   // Bodies and contacts of all components of a closed island; nothing where two worlds' do not fit together, which
   // `misfit` then tells.
   std::optional<BodySet> assemble(const Closure& closure, std::string& misfit) const;
@@ -61,6 +67,8 @@ class MixedIslands {
     std::vector<std::uint64_t> hashes;                          // by component
     std::unordered_map<BodyId, std::uint32_t> holder;           // body -> component
     std::unordered_multimap<BodyId, std::uint32_t> port_users;  // port -> components
+    std::vector<std::vector<WorldId>> touched;                  // by component: whose bodies are its ports
+    std::set<WorldId> touched_by_any;
   };
   const Neighbourhood* neighbourhood_;
   Step step_;

@@ -268,20 +268,41 @@ void Settler::pass_on(Step step, const MixedIslands::Closure& closure) {
     return std::binary_search(closure.worlds.begin(), closure.worlds.end(), world) ||
            std::binary_search(closure.missing.begin(), closure.missing.end(), world);
   };
+  const WorldId me = context_.settings.me;
+  relays_.clear();
+  for (const WorldId world : closure.worlds)
+    if (world < me && exchange.parts.touches(me, world) && exchange.parts.touches(world, me)) relays_.push_back(world);
   for (const WorldId to : hearers(step)) {
     Link* const link = context_.link_to(to);
     if (!link || !shares(to)) continue;
     for (const WorldId origin : closure.worlds) {
-      if (origin == context_.settings.me || origin == to) continue;
+      if (origin == me || origin == to) continue;
       const Part& part = *exchange.parts.find(origin);
-      const auto [passed, first] = exchange.passed.try_emplace({to, origin});
-      if (!first && passed->second.revision == part.revision) continue;
-      passed->second = {part.revision, false};
+      const auto passed = exchange.passed.find({to, origin});
+      if (passed != exchange.passed.end() && passed->second.revision == part.revision) continue;
+      if (is_told_otherwise(step, closure, origin, to)) {
+        ++context_.stats.parts_left;
+        continue;
+      }
+      exchange.passed.insert_or_assign({to, origin}, Exchange::Passed{part.revision, false});
       exchange.finals_due = true;
       link->add(part);
       ++context_.stats.parts_sent;
+      ++context_.stats.parts_passed;
     }
   }
+}
+
+// Whether `to` gets that part without this world: of its origin, or of one with a lower number that touches bodies of
+// both with one component, and so passes it on as soon as it has it. Only of who touches bodies of this world, and
+// tells it its part itself, is that certain: what others pass on of a part may be old. So each part comes to each world
+// that is two components away once, and a chain of them passes every part on along itself.
+bool Settler::is_told_otherwise(Step step, const MixedIslands::Closure& closure, WorldId origin, WorldId to) const {
+  const MixedIslands& parts = at(step).parts;
+  return parts.touches(origin, to) || std::any_of(relays_.begin(), relays_.end(), [&](WorldId between) {
+           return between != origin && between != to && parts.touches(origin, between) &&
+                  parts.touches_both(closure, between, origin, to);
+         });
 }
 
 std::set<WorldId> Settler::hearers(Step step) const {
@@ -314,9 +335,9 @@ void Settler::tell(Step step) {
         throw ProtocolError("step " + std::to_string(step) + ": an island reaches world " + std::to_string(world) +
                             ", which is no neighbour");
     for (std::size_t l = 0; l < context_.links.size(); ++l) {
-      std::optional<std::uint64_t>& told = exchange.told[l];
-      if (told ? *told == exchange.part_content : !to.contains(context_.links[l].peer())) continue;
-      told = exchange.part_content;
+      std::optional<std::uint32_t>& told = exchange.told[l];
+      if (told ? *told == exchange.revisions : !to.contains(context_.links[l].peer())) continue;
+      told = exchange.revisions;
       context_.links[l].add(*exchange.parts.find(context_.settings.me));
       ++context_.stats.parts_sent;
     }

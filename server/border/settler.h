@@ -82,6 +82,7 @@ class Settler {
   BodySet solve(BodySet island);
   bool part_is_final(Step step, WorldId origin) const;
   void pass_on(Step step, const MixedIslands::Closure& closure);
+  bool is_told_otherwise(Step step, const MixedIslands::Closure& closure, WorldId origin, WorldId to) const;
   std::set<WorldId> hearers(Step step) const;
 
   const Context& context_;
@@ -95,6 +96,7 @@ class Settler {
   std::vector<physics::Ends> ends_;
   physics::Islands islands_;
   std::vector<std::uint32_t> all_;
+  std::vector<WorldId> relays_;  // of the closure whose parts are being passed on
 };
 
 }  // namespace soda::border

@@ -52,6 +52,7 @@ struct CoreStats {
   std::uint64_t messages_sent = 0, bytes_sent = 0;
   std::uint64_t frames_sent = 0, frame_bodies_sent = 0;  // frames that held bodies, and how many
   std::uint64_t parts_sent = 0;                          // own parts and parts passed on
+  std::uint64_t parts_passed = 0, parts_left = 0;        // of others: passed on; times that it was left to somebody else
   std::uint64_t messages_resent = 0;
   std::uint64_t duplicates = 0;  // messages received again, ignored
   std::uint64_t refused = 0;     // malformed or foreign messages, and protocol errors

@@ -93,6 +93,8 @@ int main(int argc, char** argv) {
       {"offers of cells declined", s.offers_declined},
       {"links opened while it ran", s.links_opened},
       {"wide bodies told", s.wide_bodies},
+      {"parts passed on", s.parts_passed},
+      {"times that passing one on was left to somebody else", s.parts_left},
   };
   bool all = true;
   for (const auto& [what, count] : happened) {

@@ -317,6 +317,8 @@ void add(border::CoreStats& sum, const border::CoreStats& s) {
   sum.frames_sent += s.frames_sent;
   sum.frame_bodies_sent += s.frame_bodies_sent;
   sum.parts_sent += s.parts_sent;
+  sum.parts_passed += s.parts_passed;
+  sum.parts_left += s.parts_left;
   sum.messages_resent += s.messages_resent;
   sum.duplicates += s.duplicates;
   sum.refused += s.refused;
