@@ -17,6 +17,7 @@ export interface SodaDebug {
   frameMilliseconds(): number; // JavaScript per picture, mean of the last second
   bodyPosition(id: Id): [number, number, number] | null;
   screenPosition(id: Id): [number, number] | null; // CSS pixels on the page
+  bodyAt(x: number, y: number): bigint | null; // that a click there would meet
   readonly rollbacks: readonly RollbackRecord[];
   readonly answers: readonly AnswerRecord[];
   connected(): boolean;
@@ -60,6 +61,7 @@ export function expose(picture: Picture, session: Session, requests: Requests, r
       const body = find(id);
       return body === undefined ? null : picture.screenPosition(body);
     },
+    bodyAt: (x, y) => picture.bodyAt(x, y),
     rollbacks: session.rollbacks,
     answers: requests.answers,
     connected,

@@ -98,19 +98,19 @@ describe('the page', { skip: existsSync(chromium) ? false : 'there is no chromiu
   test('pushes what is clicked on, and tells the rollback', async () => {
     await page.keyboard.press('3');
     const rollbacks = await page.evaluate(() => window.soda.rollbacks.length);
-    const [x, y] = await page.evaluate(() => {
-      // The lowest slab of the nearest stack would do; any body in the picture that is hit is as good.
-      for (let id = 1; id <= 300; id++) {
-        const at = window.soda.screenPosition(id);
-        if (at && at[0] > 300 && at[0] < 600 && at[1] > 200 && at[1] < 450) return at;
-      }
-      return [500, 300];
+    await pause(); // or it might have gone when the click comes
+    await page.waitForFunction(() => window.soda.step() === window.soda.displayed(), null, limit);
+    const at = await page.evaluate(() => {
+      for (let y = 200; y < 450; y += 5) for (let x = 300; x < 600; x += 5) if (window.soda.bodyAt(x, y) !== null) return [x, y] as const;
+      return null;
     });
-    await page.mouse.click(x!, y!);
+    assert.ok(at, 'there is no body in the middle of the picture');
+    await page.mouse.click(...at);
     await page.waitForFunction(() => window.soda.answers.some((a) => a.asked === 'push' && a.accepted), null, limit);
     await page.waitForFunction((n) => window.soda.rollbacks.length > n, rollbacks, limit);
     await page.waitForFunction(() => document.querySelector('#ticker .mine'), null, limit);
     await page.keyboard.press('1');
+    await resume();
   });
 
   test('adds a body, grabs it, and removes it', async () => {
@@ -118,11 +118,23 @@ describe('the page', { skip: existsSync(chromium) ? false : 'there is no chromiu
       for (const button of document.querySelectorAll<HTMLButtonElement>('#tools button'))
         if (button.ariaLabel?.startsWith('Add')) button.click();
     });
+    await pause(); // the mock's bodies fall through each other: soon it would be inside another
     await page.getByRole('button', { name: 'Add in front of me' }).click();
+    await page.waitForFunction(() => window.soda.answers.some((a) => a.asked === 'spawn' && a.accepted), null, limit);
+    const step = await page.evaluate(() => Number(window.soda.answers.findLast((a) => a.asked === 'spawn')!.step));
+    for (let now = await page.evaluate(() => window.soda.displayed()); now < step; now++) {
+      await page.keyboard.press('.');
+      await page.waitForFunction((s) => window.soda.displayed() === s && window.soda.step() === s, now + 1, limit);
+    }
     await page.waitForFunction(() => window.soda.bodiesDrawn() === 301, null, limit);
     await page.keyboard.press('1');
-    await pause();
-    const at = await page.evaluate(() => window.soda.screenPosition(301)!);
+    const at = await page.evaluate(() => {
+      const [x, y] = window.soda.screenPosition(301)!;
+      for (let d = 0; d < 30; d++)
+        for (const p of [[x, y - d], [x, y + d], [x - d, y], [x + d, y]] as const) if (window.soda.bodyAt(...p) === 301n) return p;
+      return null;
+    });
+    assert.ok(at, 'what was added is out of sight');
     await page.keyboard.down('Control');
     await page.mouse.move(at[0], at[1]);
     await page.mouse.down();

@@ -1,7 +1,7 @@
 // The pointer on the scene. Without a tool it is the camera's (OrbitControls) and a click selects; with one, or with Ctrl
 // held, the left button does something to bodies.
 import { create } from '@bufbuild/protobuf';
-import { Quaternion, Ray, Raycaster, Vector2, Vector3 } from 'three';
+import { Quaternion, Ray, Vector3 } from 'three';
 import { PushSchema, RemoveSchema } from '../gen/action_pb';
 import type { Hit, Picker } from '../draw/pick';
 import type { Marks } from '../draw/marks';
@@ -27,7 +27,6 @@ export class Tools {
   tool: Tool = 'select';
   private grabbing: Grabbing | null = null;
   private down: { x: number; y: number; button: number; used: boolean } | null = null;
-  private caster = new Raycaster();
   private awaited: bigint | null = null; // a spawned body, to be selected once it is there
   private hoverAt: PointerEvent | null = null;
 
@@ -49,7 +48,7 @@ export class Tools {
     canvas.addEventListener('pointercancel', () => this.letGo(), { capture: true });
     canvas.addEventListener('wheel', (event) => this.wheeled(event), { capture: true, passive: false });
     canvas.addEventListener('dblclick', (event) => {
-      const hit = this.picker.pick(this.rayAt(event));
+      const hit = this.picker.pick(this.stage.rayAt(event));
       if (hit && hit.body >= 0) {
         this.select(hit.body);
         this.views.follow(hit.body);
@@ -125,7 +124,7 @@ export class Tools {
       this.marks.hovered = -1;
       return;
     }
-    this.marks.hovered = this.picker.pick(this.rayAt(event))?.body ?? -1;
+    this.marks.hovered = this.picker.pick(this.stage.rayAt(event))?.body ?? -1;
   }
 
   get busy(): boolean {
@@ -140,7 +139,7 @@ export class Tools {
     this.down = { x: event.clientX, y: event.clientY, button: event.button, used: false };
     const tool = event.ctrlKey || event.metaKey ? 'grab' : this.tool;
     if (tool !== 'grab' && tool !== 'push') return;
-    const hit = this.picker.pick(this.rayAt(event));
+    const hit = this.picker.pick(this.stage.rayAt(event));
     if (!hit || hit.body < 0) return;
     event.stopImmediatePropagation();
     event.preventDefault();
@@ -158,7 +157,7 @@ export class Tools {
     this.hoverAt = event;
     if (this.grabbing) {
       event.stopImmediatePropagation();
-      this.grabbing.drag(this.rayAt(event));
+      this.grabbing.drag(this.stage.rayAt(event));
     }
   }
 
@@ -171,7 +170,7 @@ export class Tools {
       return;
     }
     if (!down || down.used || Math.hypot(event.clientX - down.x, event.clientY - down.y) > clickSlop) return;
-    const hit = this.picker.pick(this.rayAt(event));
+    const hit = this.picker.pick(this.stage.rayAt(event));
     if (this.tool === 'spawn') {
       if (hit) this.spawn(hit);
       return;
@@ -188,7 +187,7 @@ export class Tools {
 
   private push(hit: Hit, event: PointerEvent): void {
     const { body } = hit;
-    const impulse = this.rayAt(event).direction.clone().multiplyScalar(this.bodies.mass[body]! * this.settings.now.pushSpeed);
+    const impulse = this.stage.rayAt(event).direction.clone().multiplyScalar(this.bodies.mass[body]! * this.settings.now.pushSpeed);
     const turn = new Quaternion().fromArray(this.bodies.rot, 4 * body);
     const centre = new Vector3().fromArray(this.bodies.pos, 3 * body);
     const point = hit.point.clone().sub(centre).applyQuaternion(turn.invert());
@@ -222,13 +221,4 @@ export class Tools {
   }
 
   // A ray through the pointer.
-  private rayAt(event: MouseEvent): Ray {
-    const box = this.canvas.getBoundingClientRect();
-    const place = new Vector2(
-      (2 * (event.clientX - box.left)) / box.width - 1,
-      1 - (2 * (event.clientY - box.top)) / box.height,
-    );
-    this.caster.setFromCamera(place, this.stage.camera);
-    return this.caster.ray.clone();
-  }
 }

@@ -162,6 +162,12 @@ export class Picture {
     return [box.left + (0.5 + 0.5 * at.x) * box.width, box.top + (0.5 - 0.5 * at.y) * box.height];
   }
 
+  // The id of the body that a click there would meet, in CSS pixels of the page; null: none.
+  bodyAt(x: number, y: number): bigint | null {
+    const hit = this.picker.pick(this.stage.rayAt({ clientX: x, clientY: y }));
+    return hit && hit.body >= 0 ? this.bodies.ids[hit.body]! : null;
+  }
+
   // How many cells each world owns at the step that is shown.
   cells(): number[] {
     this.passTransfers();

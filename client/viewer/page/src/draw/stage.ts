@@ -11,9 +11,12 @@ import {
   PCFSoftShadowMap,
   PerspectiveCamera,
   Quaternion,
+  Raycaster,
+  type Ray,
   Scene,
   ShaderMaterial,
   SphereGeometry,
+  Vector2,
   Vector3,
   WebGLRenderer,
   type Material,
@@ -34,6 +37,7 @@ export class Stage {
   private sky: Mesh<SphereGeometry, ShaderMaterial>;
   private up = new Vector3(0, 0, 1);
   private toSun = new Vector3();
+  private caster = new Raycaster();
   private radius = 20; // m, of the scene
   readonly focusPoint = new Vector3();
 
@@ -130,6 +134,14 @@ export class Stage {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+  }
+
+  // From the eye through a point of the page, in CSS pixels.
+  rayAt({ clientX: x, clientY: y }: { clientX: number; clientY: number }): Ray {
+    const box = this.canvas.getBoundingClientRect();
+    const place = new Vector2((2 * (x - box.left)) / box.width - 1, 1 - (2 * (y - box.top)) / box.height);
+    this.caster.setFromCamera(place, this.camera);
+    return this.caster.ray.clone();
   }
 
   // The light goes where the user looks: one shadow map then has texels of a few centimetres there, and none is spent
