@@ -121,7 +121,7 @@ describe('the page', { skip: existsSync(chromium) ? false : 'there is no chromiu
     await pause(); // the mock's bodies fall through each other: soon it would be inside another
     await page.getByRole('button', { name: 'Add in front of me' }).click();
     await page.waitForFunction(() => window.soda.answers.some((a) => a.asked === 'spawn' && a.accepted), null, limit);
-    const step = await page.evaluate(() => Number(window.soda.answers.findLast((a) => a.asked === 'spawn')!.step));
+    const step = await page.evaluate(() => Number(window.soda.answers.find((a) => a.asked === 'spawn')!.step));
     for (let now = await page.evaluate(() => window.soda.displayed()); now < step; now++) {
       await page.keyboard.press('.');
       await page.waitForFunction((s) => window.soda.displayed() === s && window.soda.step() === s, now + 1, limit);
