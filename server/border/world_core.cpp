@@ -397,12 +397,15 @@ class WorldCore::Impl final : timeline::Arbiter {
     observer_.finalised(step, Produced(timeline_, step));
   }
 
-  // What is final, and told to be so, is not needed any more; the newest final state is where the next step starts
-  // from.
+  // What is final, and told to be so (where there is anybody to tell), is not needed any more; the newest final state is
+  // where the next step starts from.
   void release() {
-    Step keep = links_.empty() ? final_ : std::min(final_, near_final_ + 1);
-    for (Step step = timeline_.oldest(); step < keep; ++step)
-      if (!settler_.all_told(step)) keep = step;
+    Step keep = final_;
+    if (!links_.empty()) {
+      keep = std::min(keep, near_final_ + 1);
+      for (Step step = timeline_.oldest(); step < keep; ++step)
+        if (!settler_.all_told(step)) keep = step;
+    }
     for (Step step = timeline_.oldest(); step < keep; ++step) count(step);
     timeline_.release_before(keep);
     announcer_.release_before(keep);

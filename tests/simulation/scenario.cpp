@@ -144,6 +144,8 @@ SessionResult run_scenario(const Scenario& s) {
   got.failure = first_difference(s.actions.empty() ? std::vector<StepDigest>(expected.steps.begin(), end)
                                                    : run_single(expected.scene, s.steps, s.actions),
                                  got.steps);
+  if (got.failure.empty() && got.kept > 0)
+    got.failure = std::to_string(got.kept) + " final steps are still kept at the end";
   if (got.failure.empty() && got.total.refused > 0)
     got.failure = std::to_string(got.total.refused) + " messages refused";
   return got;

@@ -278,7 +278,10 @@ class Session {
   }
 
   SessionResult collect() {
-    for (const auto& core : cores_) add(result_.total, core->stats());
+    for (const auto& core : cores_) {
+      add(result_.total, core->stats());
+      result_.kept = std::max(result_.kept, core->final_step() - core->oldest());
+    }
     return result_;
   }
 

@@ -41,6 +41,7 @@ struct SessionResult {
   border::CoreStats total;        // likewise
   std::uint64_t lost = 0, doubled = 0, delivered = 0, touched = 0, held = 0;
   std::size_t least_neighbours = 0;
+  Step kept = 0;        // final steps before the newest one that a world still kept at the end, at most
   std::string failure;  // empty: all worlds made the last step final
 };
 
