@@ -37,15 +37,16 @@ bool still_fit(const ContactRecord& record, const Party& a, const Party& b, doub
   return moved < kLimit && 4 * turned_a * a.radius * a.radius < kLimit && 4 * turned_b * b.radius * b.radius < kLimit;
 }
 
+// Of the normal turned back instead of the arms.
 double nearest_point(const ContactRecord& record, const Party& a, const Party& b) {
-  const Mat3 turn_a = turn_since(record.orientation_a, a.rotation),
-             turn_b = turn_since(record.orientation_b, b.rotation);
-  const Vec3 offset = b.position - a.position, n = vec(record.normal);
+  const auto turned_back = [&](const double* then, const Party& party) -> Vec3 {
+    return Quat(then[3], then[0], then[1], then[2]) * (party.orientation.conjugate() * vec(record.normal));
+  };
+  const Vec3 normal_a = turned_back(record.orientation_a, a), normal_b = turned_back(record.orientation_b, b);
   double nearest = std::numeric_limits<double>::infinity();
   for (std::uint32_t k = 0; k < record.count; ++k)
-    nearest =
-        std::min(nearest, n.dot(offset + turn_b * vec(record.points[k].arm_b) - turn_a * vec(record.points[k].arm_a)));
-  return nearest;
+    nearest = std::min(nearest, normal_b.dot(vec(record.points[k].arm_b)) - normal_a.dot(vec(record.points[k].arm_a)));
+  return vec(record.normal).dot(b.position - a.position) + nearest;
 }
 
 // A round body rolls away from its anchors; only faces keep theirs, and a cylinder's cap is one.
@@ -92,6 +93,11 @@ void reduce(std::vector<DetectedPoint>& points) {
   points.resize(kMaxContactPoints);
 }
 
+// From how a body's axes lay to how they lie now.
+Mat3 turn_since(const double* then, const Mat3& rotation_now) {
+  return rotation_now * Quat(then[3], then[0], then[1], then[2]).toRotationMatrix().transpose();
+}
+
 // Hands impulses of old points over to new ones at the same place on either body; `lone` where both hold one point of a
 // round body, which is the same contact wherever it has rolled.
 void match_impulses(ContactRecord& record, const Party& a, const Party& b, std::span<const ContactRecord> previous,
@@ -122,10 +128,6 @@ void match_impulses(ContactRecord& record, const Party& a, const Party& b, std::
 }
 
 }  // namespace
-
-Mat3 turn_since(const double* then, const Mat3& rotation_now) {
-  return rotation_now * Quat(then[3], then[0], then[1], then[2]).toRotationMatrix().transpose();
-}
 
 void ContactUpdater::update(const Party& a, const Party& b, std::span<const ContactRecord> previous,
                             double max_distance, std::vector<ContactRecord>& out) {

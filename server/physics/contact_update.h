@@ -47,7 +47,4 @@ constexpr std::uint32_t child_pair(std::uint32_t child_a, std::uint32_t child_b)
   return child_a << 20 | child_b << 8;
 }
 
-// How a body has turned since a record's points were detected.
-Mat3 turn_since(const double* orientation_then, const Mat3& rotation_now);
-
 }  // namespace soda::physics

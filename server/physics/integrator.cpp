@@ -50,6 +50,12 @@ void limit_speed(MovingBody& body, double max_speed) {
 
 }  // namespace
 
+Mat3 inverse_inertia_in_world(const BodyModel& model, const Quat& orientation) {
+  if (model.isotropic) return model.inverse_inertia;
+  const Mat3 rotation = orientation.toRotationMatrix();
+  return rotation * model.inverse_inertia * rotation.transpose();
+}
+
 void begin_step(const BodyState& state, const BodyModel& model, MovingBody& body) {
   // Never -0: whether it stays so would depend on what is solved in other lanes.
   body.v = state.v() + Vec3::Zero();
@@ -57,12 +63,8 @@ void begin_step(const BodyState& state, const BodyModel& model, MovingBody& body
   body.moved = body.turned = Vec3::Zero();
   body.x = state.x();
   body.q = state.q();
-  body.rotation = body.q.toRotationMatrix();
   body.inverse_mass = model.inverse_mass;
-  if (model.isotropic)
-    body.inverse_inertia = model.inverse_inertia;
-  else
-    body.inverse_inertia = body.rotation * model.inverse_inertia * body.rotation.transpose();
+  body.inverse_inertia = inverse_inertia_in_world(model, body.q);
   body.model = &model;
   body.clamped = false;
   if (model.drive) {

@@ -32,17 +32,18 @@ struct MovingBody {
   double moved_pad = 0;
   Vec3 turned;  // rad, likewise
   double turned_pad = 0;
-  double inverse_mass;
-  Mat3 inverse_inertia;  // world frame, at the start of the step
-  Vec3 x;                // m, at the start of the step
   Quat q;                // now
-  Mat3 rotation;         // at the start of the step
+  Vec3 x;                // m, at the start of the step
+  double inverse_mass;   // 1/kg
+  Mat3 inverse_inertia;  // world frame, at the start of the step
   const BodyModel* model;
   Vec3 drive_target;  // m/s, with the axes turned round; meaningful where the model has a drive
   bool clamped;       // was faster than the scene's largest speed
 };
 
-// From a state; world inertia from its orientation.
+Mat3 inverse_inertia_in_world(const BodyModel& model, const Quat& orientation);  // 1/(kg m²)
+
+// From a state.
 void begin_step(const BodyState& state, const BodyModel& model, MovingBody& body);
 
 // v += (gravity, drive, damping) over h seconds.

@@ -27,12 +27,7 @@ End end_of(const MovingBody& body, const Pose& at) {
   end.place = body.x + body.moved + end.arm;
   end.frame = body.q * at.orientation;
   end.inverse_mass = body.inverse_mass;
-  if (body.model->isotropic) {
-    end.inverse_inertia = body.model->inverse_inertia;
-  } else {
-    const Mat3 rotation = body.q.toRotationMatrix();
-    end.inverse_inertia = rotation * body.model->inverse_inertia * rotation.transpose();
-  }
+  end.inverse_inertia = inverse_inertia_in_world(*body.model, body.q);
   return end;
 }
 

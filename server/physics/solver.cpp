@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <numbers>
 
-#include "server/physics/contact_update.h"
 #include "server/physics/impacts.h"
 #include "server/physics/lanes.h"
 #include "server/physics/line.h"
@@ -15,17 +13,31 @@
 namespace soda::physics {
 namespace {
 
-Vec3 vec(const double* p) { return Vec3(p[0], p[1], p[2]); }
-
-double inverse_or_zero(double x) { return x > 0 ? 1 / x : 0; }
-
-// How much each point weighs in the place where friction acts: what it carried last, or, in a new contact, the same for
-// all that touch.
-constexpr double kTouching = 0.005;  // m
-
 static_assert(offsetof(MovingBody, v) == offsetof(Motion, v) && offsetof(MovingBody, w) == offsetof(Motion, w) &&
               offsetof(MovingBody, moved) == offsetof(Motion, moved) &&
-              offsetof(MovingBody, turned) == offsetof(Motion, turned) && alignof(MovingBody) == alignof(Motion));
+              offsetof(MovingBody, turned) == offsetof(Motion, turned) &&
+              offsetof(MovingBody, q) == offsetof(Motion, q) && offsetof(MovingBody, x) == offsetof(Motion, x) &&
+              offsetof(MovingBody, inverse_mass) == offsetof(Motion, inverse_mass) &&
+              offsetof(MovingBody, inverse_inertia) == offsetof(Motion, inverse_inertia) &&
+              sizeof(MovingBody) >= sizeof(Motion) && alignof(MovingBody) == alignof(Motion));
+static_assert(offsetof(ContactRecord, offset) - offsetof(ContactRecord, normal) == kRecordOffset * sizeof(double) &&
+              offsetof(ContactRecord, orientation_a) - offsetof(ContactRecord, normal) ==
+                  kRecordOrientationA * sizeof(double) &&
+              offsetof(ContactRecord, orientation_b) - offsetof(ContactRecord, normal) ==
+                  kRecordOrientationB * sizeof(double) &&
+              offsetof(ContactRecord, friction) - offsetof(ContactRecord, normal) == kRecordFriction * sizeof(double) &&
+              offsetof(ContactRecord, twist) - offsetof(ContactRecord, normal) == kRecordTwist * sizeof(double) &&
+              offsetof(ContactRecord, points) - offsetof(ContactRecord, normal) == kRecordPoints * sizeof(double) &&
+              sizeof(ContactRecord) - offsetof(ContactRecord, normal) == kRecordNumbers * sizeof(double));
+static_assert(offsetof(ContactPoint, arm_b) == kPointArmB * sizeof(double) &&
+              offsetof(ContactPoint, impulse) == kPointImpulse * sizeof(double) &&
+              sizeof(ContactPoint) == kPointNumbers * sizeof(double));
+// A pose's numbers may be loaded by fours.
+static_assert(offsetof(Pose, position) + 4 * sizeof(double) <= sizeof(Pose));
+
+// Of lanes that are not in use, and of b where it is static.
+constexpr double kNoNumbers[kRecordNumbers] = {};
+constexpr Motion kNoMotion = {};
 
 // J: of two bodies' turning, and of their moving against each other.
 double energy_between(const MovingBody& a, const MovingBody& b) {
@@ -52,7 +64,8 @@ void IslandSolver::tune(std::uint32_t substeps) {
   }
 }
 
-std::pair<Batch*, int> IslandSolver::lane_for(std::uint32_t a, std::uint32_t b) {
+void IslandSolver::add(std::span<const MovingBody> bodies, std::uint32_t a, std::uint32_t b, std::uint32_t index,
+                       const Surface& surface, const ContactRecord& record) {
   bool fits = used_ > 0 && lanes_ < kLanes;
   if (fits) {
     const Batch& open = batches_[used_ - 1];
@@ -60,25 +73,27 @@ std::pair<Batch*, int> IslandSolver::lane_for(std::uint32_t a, std::uint32_t b) 
       fits = fits && open.a[l] != a && open.a[l] != b && (open.b[l] == kNoBody || (open.b[l] != a && open.b[l] != b));
   }
   if (!fits) {
+    close_batch();
     if (used_ == batches_.size()) batches_.emplace_back();
     Batch& fresh = batches_[used_++];
-    std::memset(static_cast<void*>(&fresh), 0, sizeof fresh);
-    std::fill_n(fresh.a, kLanes, kNoBody);
-    std::fill_n(fresh.b, kLanes, kNoBody);
-    std::fill_n(fresh.record, kLanes, kNoBody);
+    for (int l = 0; l < kLanes; ++l) {
+      fresh.a[l] = fresh.b[l] = fresh.record[l] = kNoBody;
+      fresh.count[l] = 0;
+      inputs_[l] = {kNoNumbers, &kNoMotion, &kNoMotion, kNoNumbers, kNoNumbers, false};
+    }
+    fresh.points = 0;
+    fresh.bounces = false;
+    fresh.friction = fresh.restitution = fresh.moves_on_a = Lanes{};
+    fresh.bias_rate = fresh.mass_scale = fresh.impulse_scale = Lanes{};
     lanes_ = 0;
   }
-  return {&batches_[used_ - 1], lanes_++};
-}
-
-void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slot_a, std::uint32_t slot_b,
-                           const Surface& surface, const ContactRecord& record, Batch& batch, int lane) const {
-  const MovingBody& a = bodies[slot_a];
-  const MovingBody* const b = slot_b == kNoBody ? nullptr : &bodies[slot_b];
-  const Softness& soft = soft_[surface.half_octaves][b ? 0 : 1];
-  const double share = 1.0 / substeps_;  // of what the record carried in a step
-  batch.a[lane] = slot_a;
-  batch.b[lane] = slot_b;
+  Batch& batch = batches_[used_ - 1];
+  const int lane = lanes_++;
+  const bool moving = b != kNoBody;
+  const Softness& soft = soft_[surface.half_octaves][moving ? 0 : 1];
+  batch.a[lane] = a;
+  batch.b[lane] = b;
+  batch.record[lane] = index;
   batch.count[lane] = record.count;
   batch.points = std::max(batch.points, record.count);
   batch.bounces = batch.bounces || surface.restitution > 0;
@@ -88,108 +103,23 @@ void IslandSolver::prepare(std::span<const MovingBody> bodies, std::uint32_t slo
   batch.bias_rate[lane] = soft.bias_rate;
   batch.mass_scale[lane] = soft.mass_scale;
   batch.impulse_scale[lane] = soft.impulse_scale;
-  const double inverse_mass_b = b ? b->inverse_mass : 0, linear = a.inverse_mass + inverse_mass_b;
-  batch.inverse_mass_a[lane] = a.inverse_mass;
-  batch.inverse_mass_b[lane] = inverse_mass_b;
-
-  const Mat3 turn_a = turn_since(record.orientation_a, a.rotation);
-  const Mat3 turn_b = turn_since(record.orientation_b, b ? b->rotation : surface.fixed->rotation);
-  const Vec3 b_minus_a = (b ? b->x : surface.fixed->pose.position) - a.x;
-  const Vec3 normal = vec(record.normal);
-  const Vec3 tangent[2] = {normal.unitOrthogonal(), normal.cross(normal.unitOrthogonal())};
-  put(batch.normal, lane, normal);
-  for (int t = 0; t < 2; ++t) put(batch.tangent[t], lane, tangent[t]);
-
-  struct Made {
-    Vec3 a_turn, a_spin, b_turn, b_spin;
-  };
-  const auto make_row = [&](const Vec3& ra, const Vec3& rb, const Vec3& direction, Row& row) {
-    Made made;
-    made.a_turn = ra.cross(direction);
-    made.a_spin = a.inverse_inertia * made.a_turn;
-    put(row.a_turn, lane, made.a_turn);
-    put(row.a_spin, lane, made.a_spin);
-    if (b) {
-      made.b_turn = rb.cross(direction);
-      made.b_spin = b->inverse_inertia * made.b_turn;
-      put(row.b_turn, lane, made.b_turn);
-      put(row.b_spin, lane, made.b_spin);
-    }
-    return made;
-  };
-  const auto inverse_mass_of = [&](const Made& l, const Made& r) {
-    return l.a_turn.dot(r.a_spin) + (b ? l.b_turn.dot(r.b_spin) : 0.0);
-  };
-
-  // Bodies at rest on each other keep their frozen places, as if they were one: that is what holds tall stacks up.
-  // Others are pushed in one place, half way between: angular momentum is kept.
-  Vec3 shift = Vec3::Zero();
-  if (b) {
-    const Vec3 slip = b->v + b->w.cross(vec(record.points[0].arm_b)) - a.v - a.w.cross(vec(record.points[0].arm_a));
-    if (slip.squaredNorm() > kMovingSpeed * kMovingSpeed) {
-      shift = 0.5 * (b_minus_a - vec(record.offset));
-      shift -= normal.dot(shift) * normal;
-    }
+  const auto motion = [](const MovingBody& body) { return reinterpret_cast<const Motion*>(&body); };
+  LaneInput& input = inputs_[lane];
+  input.record = record.normal;
+  input.a = motion(bodies[a]);
+  input.moving = moving;
+  if (moving) {
+    input.b = motion(bodies[b]);
+    input.b_place = bodies[b].x.data();
+    input.b_orientation = bodies[b].q.coeffs().data();
+  } else {
+    input.b_place = surface.fixed->pose.position.data();
+    input.b_orientation = surface.fixed->pose.orientation.coeffs().data();
   }
-  Vec3 ra[kMaxContactPoints], rb[kMaxContactPoints];
-  double impulses[kMaxContactPoints], separations[kMaxContactPoints], carried = 0;
-  for (std::uint32_t k = 0; k < record.count; ++k) {
-    BatchPoint& p = batch.point[k];
-    // The distance follows the bodies' poses; the arms at which they are pushed stay as they were when detected.
-    ra[k] = vec(record.points[k].arm_a);
-    rb[k] = vec(record.points[k].arm_b);
-    separations[k] = normal.dot(b_minus_a + turn_b * rb[k] - turn_a * ra[k]);
-    impulses[k] = share * record.points[k].impulse;
-    carried += impulses[k];
-    ra[k] += shift;
-    rb[k] -= shift;
-    const Made row = make_row(ra[k], rb[k], normal, p.row);
-    p.separation[lane] = separations[k];
-    p.mass[lane] = inverse_or_zero(linear + inverse_mass_of(row, row));
-    p.impulse[lane] = impulses[k];
-    p.lever_a[lane] = 0.5 * row.a_turn.norm();
-    if (b) p.lever_b[lane] = 0.5 * row.b_turn.norm();
-  }
+}
 
-  Vec3 centre_a = Vec3::Zero(), centre_b = Vec3::Zero();
-  double weight = 0;
-  for (std::uint32_t k = 0; k < record.count; ++k) {
-    const double w = carried > 0 ? impulses[k] : separations[k] < kTouching ? 1 : 1e-6;
-    centre_a += w * ra[k];
-    centre_b += w * rb[k];
-    weight += w;
-  }
-  centre_a /= weight;
-  centre_b /= weight;
-  // Friction acts half way across the gap.
-  const Vec3 gap = (0.5 * normal.dot(b_minus_a + centre_b - centre_a)) * normal;
-  centre_a += gap;
-  centre_b -= gap;
-  for (std::uint32_t k = 0; k < record.count; ++k) {
-    const Vec3 arm = ra[k] - centre_a;
-    batch.point[k].arm[lane] = (arm - normal.dot(arm) * normal).norm();
-  }
-  const Vec3 friction = share * vec(record.friction);
-  Made slide[2];
-  for (int t = 0; t < 2; ++t) {
-    slide[t] = make_row(centre_a, centre_b, tangent[t], batch.slide[t]);
-    batch.slide_impulse[t][lane] = friction.dot(tangent[t]);
-  }
-  const double k00 = linear + inverse_mass_of(slide[0], slide[0]);
-  const double k11 = linear + inverse_mass_of(slide[1], slide[1]);
-  const double k01 = inverse_mass_of(slide[0], slide[1]);
-  const double inverse_determinant = inverse_or_zero(k00 * k11 - k01 * k01);
-  batch.k00[lane] = k11 * inverse_determinant;
-  batch.k11[lane] = k00 * inverse_determinant;
-  batch.k01[lane] = -k01 * inverse_determinant;
-
-  const Vec3 a_twist = a.inverse_inertia * normal;
-  const Vec3 b_twist = b ? Vec3(b->inverse_inertia * normal) : Vec3(Vec3::Zero());
-  put(batch.a_twist, lane, a_twist);
-  put(batch.b_twist, lane, b_twist);
-  if (record.count < 2) return;  // a single point does not hold against turning
-  batch.twist_mass[lane] = inverse_or_zero(normal.dot(a_twist + b_twist));
-  batch.twist_impulse[lane] = share * record.twist;
+void IslandSolver::close_batch() {
+  if (used_ > 0) kernel_->prepare(batches_[used_ - 1], inputs_, 1.0 / substeps_);
 }
 
 void IslandSolver::settle_torques(std::span<MovingBody> bodies) const {
@@ -243,10 +173,9 @@ void IslandSolver::solve(std::uint32_t substeps, std::span<MovingBody> bodies, s
       joints_.add(*surfaces[index].joint, a, b, index, records[index]);
       continue;
     }
-    const auto [batch, lane] = lane_for(a, b);
-    batch->record[lane] = index;
-    prepare(bodies, a, b, surfaces[index], records[index], *batch, lane);
+    add(bodies, a, b, index, surfaces[index], records[index]);
   }
+  close_batch();
   joints_.arrange(bodies);
   const Bodies moving{reinterpret_cast<std::byte*>(bodies.data()), sizeof(MovingBody)};
   const bool bounces = std::any_of(batches_.begin(), batches_.begin() + static_cast<std::ptrdiff_t>(used_),

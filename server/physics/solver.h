@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "common/contact_record.h"
@@ -50,10 +49,10 @@ class IslandSolver {
              std::span<ContactRecord> records);
 
  private:
-  // The next lane for a contact of these two bodies: in the newest batch if it has room and shares neither.
-  std::pair<Batch*, int> lane_for(std::uint32_t a, std::uint32_t b);
-  void prepare(std::span<const MovingBody> bodies, std::uint32_t a, std::uint32_t b, const Surface& surface,
-               const ContactRecord& record, Batch& batch, int lane) const;
+  // A contact of these two bodies goes into the next lane of the newest batch, if it has room and shares neither.
+  void add(std::span<const MovingBody> bodies, std::uint32_t a, std::uint32_t b, std::uint32_t index,
+           const Surface& surface, const ContactRecord& record);
+  void close_batch();  // the newest gets no more
   // Pays what the contacts' places owe in angular momentum: see Batch::owed.
   void settle_torques(std::span<MovingBody> bodies) const;
   void store(std::span<ContactRecord> records) const;
@@ -68,6 +67,7 @@ class IslandSolver {
   std::vector<Batch> batches_;
   std::size_t used_ = 0;  // of batches_
   int lanes_ = 0;         // used in the newest
+  LaneInput inputs_[kLanes] = {};  // of the newest
 };
 
 }  // namespace soda::physics

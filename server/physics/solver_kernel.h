@@ -21,10 +21,15 @@ struct Lanes3 {
 
 constexpr std::uint32_t kNoBody = 0xffffffffu;  // a static one, or of a lane that is not in use
 
-// What moves of a body while its island is solved, at the start of each body of the array that the kernels are given.
+// What the kernels know of a body, at the start of each one of the array that they are given.
 struct alignas(32) Motion {
   double v[4], w[4];           // m/s, rad/s; the fourth is 0 in all of them
   double moved[4], turned[4];  // m, rad: since the start of the step
+  double q[4];                 // orientation, x, y, z, w
+  double x[3];                 // m, at the start of the step
+  double inverse_mass;         // 1/kg
+  double inverse_inertia[9];   // world frame, at the start of the step
+  double unused;               // what is behind the nine is loaded with the last of them
 };
 
 struct Row {              // one direction at one place
@@ -38,7 +43,6 @@ struct BatchPoint {
   Lanes separation;        // m, at the start of the step
   Lanes impulse;           // N s, accumulated, of this sub-step
   Lanes arm;               // m, from the friction centre, for the twist limit
-  Lanes lever_a, lever_b;  // m: half the lengths of the angular Jacobians
 };
 
 // Up to four contacts that share no moving body. Lanes that are not in use are all zero, and stay so.
@@ -63,6 +67,20 @@ struct Batch {
   Lanes3 owed;
 };
 
+// What a lane's contact is made of: the numbers of a ContactRecord from its normal on, the bodies (b: one that is
+// nothing but zeros where it is static), and where b is.
+struct LaneInput {
+  const double* record;
+  const Motion *a, *b;
+  const double *b_place, *b_orientation;
+  bool moving;  // b is not static
+};
+// Where in those numbers.
+enum RecordNumber { kRecordNormal = 0, kRecordOffset = 3, kRecordOrientationA = 6, kRecordOrientationB = 10,
+                    kRecordFriction = 14, kRecordTwist = 17, kRecordPoints = 18 };
+enum PointNumber { kPointArmA = 0, kPointArmB = 3, kPointImpulse = 6, kPointNumbers = 7 };
+constexpr int kRecordNumbers = kRecordPoints + 4 * kPointNumbers;
+
 struct Bodies {
   std::byte* first;    // a Motion
   std::size_t stride;  // bytes from one to the next
@@ -70,6 +88,9 @@ struct Bodies {
 
 struct Kernel {
   const char* name;
+  // Rows, masses and impulses of a batch, of which bodies, records, counts, points, friction, restitution and softness
+  // are set: from as many inputs as there are lanes. `share`: of what the records carried, that is a sub-step's.
+  void (*prepare)(Batch& batch, const LaneInput* inputs, double share);
   void (*warm_start)(const Batch* batches, std::size_t count, Bodies bodies);
   // One pass over all constraints, in order. `bias`: push out what overlaps.
   void (*pass)(Batch* batches, std::size_t count, Bodies bodies, double inverse_h, bool bias);
