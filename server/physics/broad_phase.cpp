@@ -26,17 +26,29 @@ std::uint64_t mix(std::uint64_t h) {
   return h ^ (h >> 32);
 }
 
-// As Aabb::overlaps, in one go.
-bool overlap(const Aabb& a, const Aabb& b) {
-  return (a.min.x() <= b.max.x()) & (b.min.x() <= a.max.x()) & (a.min.y() <= b.max.y()) & (b.min.y() <= a.max.y()) &
-         (a.min.z() <= b.max.z()) & (b.min.z() <= a.max.z());
-}
-
 bool wanted(std::uint8_t a, std::uint8_t b) {
   return ((a | b) & kRoleAwake) != 0 && (((a | b) & kRoleWanted) != 0 || (a & b & kRoleWide) != 0);
 }
 
 }  // namespace
+
+BroadPhase::Around BroadPhase::around(const Aabb& box) {
+  constexpr float kBeyond = 0x1p-22f, kLeast = 1e-30f;  // more than rounding takes away, twice
+  Around result{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto low = static_cast<float>(box.min[axis]), high = static_cast<float>(box.max[axis]);
+    result.min[axis] = low - (std::abs(low) * kBeyond + kLeast);
+    result.max[axis] = high + (std::abs(high) * kBeyond + kLeast);
+  }
+  return result;
+}
+
+bool BroadPhase::may_overlap(const Around& l, const Around& r) {
+  const auto all = (l.min <= r.max) & (r.min <= l.max);
+  using Halves = long long __attribute__((vector_size(sizeof all)));
+  const auto halves = reinterpret_cast<Halves>(all);
+  return (halves[0] & halves[1]) == -1;
+}
 
 void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t> roles, double cell, Pairs& pairs) {
   const std::size_t n = boxes.size();
@@ -73,10 +85,13 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
   }
   for (std::size_t k = 0; k < table; ++k) buckets_[k + 1] += buckets_[k];
   entries_.resize(n - large_.size());
+  arounds_.resize(entries_.size());
   for (std::size_t i = n; i-- > 0;) {  // backwards: ends with buckets_[k] = first entry, entries ascending by body
     if (bucket_of_[i] == kLarge) continue;
     const At c = centre_cell(boxes[i]);
-    entries_[--buckets_[bucket_of_[i] + 1]] = {boxes[i], c.x, c.y, c.z, static_cast<std::uint32_t>(i), roles[i]};
+    const std::uint32_t at = --buckets_[bucket_of_[i] + 1];
+    entries_[at] = {c.x, c.y, c.z, static_cast<std::uint32_t>(i)};
+    arounds_[at] = around(boxes[i]);
   }
   // buckets_[k + 1] now holds the first entry of bucket k, buckets_[k + 2] that of the next one.
   const auto first_of = [&](std::uint64_t k) { return buckets_[k + 1]; };
@@ -89,16 +104,20 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
   };
   // Of the cells x0 to x1 of a row the entries from number `from` on. They lie next to each other, but where the table
   // begins anew.
-  const auto scan = [&](const Entry& entry, std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z,
+  const auto scan = [&](std::uint32_t e, std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z,
                         std::uint32_t from, auto&& skip) {
+    const Entry& entry = entries_[e];
+    const Around about = arounds_[e];
     const std::uint64_t k = bucket(x0, y, z);
     const auto width = static_cast<std::uint32_t>(x1 - x0);
     const auto look = [&](std::uint64_t first, std::uint64_t last) {
       for (std::uint32_t o = std::max(first_of(first), from), end = end_of(last); o < end; ++o) {
+        if (!may_overlap(about, arounds_[o])) continue;
+        // Buckets hold other cells, too.
         const Entry& other = entries_[o];
-        // Without branches that nobody can foretell. Buckets hold other cells, too.
-        const bool here = (other.y == y) & (other.z == z) & (static_cast<std::uint32_t>(other.x - x0) <= width);
-        if (here & overlap(entry.box, other.box) && !skip(o, other) && wanted(entry.role, other.role))
+        const bool here = other.y == y && other.z == z && static_cast<std::uint32_t>(other.x - x0) <= width;
+        if (here && boxes[entry.body].overlaps(boxes[other.body]) && !skip(o, other) &&
+            wanted(roles[entry.body], roles[other.body]))
           record(entry.body, other.body);
       }
     };
@@ -106,7 +125,7 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
     look(k, mask);
     look(0, k + width - mask - 1);
   };
-  const auto awake = [](const Entry& e) { return (e.role & kRoleAwake) != 0; };
+  const auto awake = [&](const Entry& e) { return (roles[e.body] & kRoleAwake) != 0; };
   const auto number_awake = static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), awake));
   if (2 * number_awake < entries_.size()) {
     // Mostly asleep: only those awake look around them, but all around. Two awake ones meet once.
@@ -115,7 +134,7 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
       if (!awake(entry)) continue;
       for (std::int32_t z = entry.z - 1; z <= entry.z + 1; ++z)
         for (std::int32_t y = entry.y - 1; y <= entry.y + 1; ++y)
-          scan(entry, entry.x - 1, entry.x + 1, y, z, 0,
+          scan(e, entry.x - 1, entry.x + 1, y, z, 0,
                [&](std::uint32_t o, const Entry& other) { return o == e || (o < e && awake(other)); });
     }
   } else {
@@ -124,9 +143,9 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
     const auto none = [](std::uint32_t, const Entry&) { return false; };
     for (std::uint32_t e = 0; e < entries_.size(); ++e) {
       const Entry& entry = entries_[e];
-      scan(entry, entry.x, entry.x, entry.y, entry.z, e + 1, none);
-      scan(entry, entry.x + 1, entry.x + 1, entry.y, entry.z, 0, none);
-      for (const auto& row : kRows) scan(entry, entry.x - 1, entry.x + 1, entry.y + row[0], entry.z + row[1], 0, none);
+      scan(e, entry.x, entry.x, entry.y, entry.z, e + 1, none);
+      scan(e, entry.x + 1, entry.x + 1, entry.y, entry.z, 0, none);
+      for (const auto& row : kRows) scan(e, entry.x - 1, entry.x + 1, entry.y + row[0], entry.z + row[1], 0, none);
     }
   }
   for (std::uint32_t l : large_)
