@@ -79,8 +79,9 @@ TEST_P(Rest, SettlesOnTheSurfaceAndStays) {
     double low = HUGE_VAL;
     for (const ContactRecord& c : set.contacts)
       for (std::uint32_t k = 0; k < c.count; ++k) {
-        const double* arm = c.points[k].arm_a;
-        const Vec3 point = b.x() + turn_since(c.orientation_a, b.q().toRotationMatrix()) * Vec3(arm[0], arm[1], arm[2]);
+        const double *arm = c.points[k].arm_a, *q = c.orientation_a;
+        const Quat turned = b.q() * Quat(q[3], q[0], q[1], q[2]).conjugate();  // since it was found
+        const Vec3 point = b.x() + turned * Vec3(arm[0], arm[1], arm[2]);
         low = std::min(low, point.z());
       }
     lowest_low = std::min(lowest_low, low);
