@@ -42,6 +42,7 @@ struct BatchPoint {
   Lanes mass;              // effective mass along the normal, kg; 0: there is no such point
   Lanes separation;        // m, at the start of the step
   Lanes impulse;           // N s, accumulated, of this sub-step
+  Lanes carried;           // N s, likewise, at the start of the step
   Lanes arm;               // m, from the friction centre, for the twist limit
 };
 

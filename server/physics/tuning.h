@@ -17,7 +17,7 @@ constexpr double kMatchDistance = 0.02;  // m; a point found this near to an old
 // anchors are what keeps tall stacks from creeping, and save most detections in resting scenes.
 constexpr double kRecycleDistance = 0.05;    // m, relative translation, at most
 constexpr double kRecycleExtentShare = 0.2;  // and at most this share of the smaller half extent of the two
-constexpr double kRecycleHalfSine = 0.08715574274765817;  // sin(5 deg): and neither body has turned by more than 10 deg
+constexpr double kRecycleHalfSine = 0.03489949670250097;  // sin(2 deg): and neither body has turned by more than 4 deg
 // m; contacts of one or two points last only while no corner has moved this far: a quarter of the speculative distance,
 // beyond which other corners were not looked at.
 constexpr double kRecycleCornerDistance = 0.005;
@@ -28,6 +28,10 @@ constexpr double kContactHertzCap = 1000;              // Hz
 constexpr double kContactDampingRatio = 10;
 constexpr double kStaticHertzFactor = 2;      // contacts with static bodies are stiffer ...
 constexpr double kStaticDampingFactor = 0.5;  // ... and less damped
+// Springs give under a load. They give less where what a contact's points carried in the last step, on average, need not
+// be asked of them: at rest only the other half. (All of it lets towers sway: nothing holds the whole contact then. Each
+// point's own makes stacks bend: nothing rights what tilts.)
+constexpr double kCarriedShare = 0.5;
 constexpr double kTurnedFar = 0.2;            // rad; from there on it is not certain what still overlaps
 constexpr double kPushOutSpeed = 3;           // m/s, limit for removing penetration
 constexpr double kTouching = 0.005;           // m; of a new contact, points this near share its friction alike
