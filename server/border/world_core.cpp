@@ -397,8 +397,8 @@ class WorldCore::Impl final : timeline::Arbiter {
     observer_.finalised(step, Produced(timeline_, step));
   }
 
-  // What is final, and told to be so (where there is anybody to tell), is not needed any more; the newest final state is
-  // where the next step starts from.
+  // What is final, and told to be so (where there is anybody to tell), is not needed any more; the newest final state
+  // is where the next step starts from.
   void release() {
     Step keep = final_;
     if (!links_.empty()) {

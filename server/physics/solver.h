@@ -65,8 +65,8 @@ class IslandSolver {
   const Kernel* kernel_ = &chosen_kernel();
   JointSolver joints_;
   std::vector<Batch> batches_;
-  std::size_t used_ = 0;  // of batches_
-  int lanes_ = 0;         // used in the newest
+  std::size_t used_ = 0;           // of batches_
+  int lanes_ = 0;                  // used in the newest
   LaneInput inputs_[kLanes] = {};  // of the newest
 };
 

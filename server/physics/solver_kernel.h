@@ -39,11 +39,11 @@ struct Row {              // one direction at one place
 
 struct BatchPoint {
   Row row;
-  Lanes mass;              // effective mass along the normal, kg; 0: there is no such point
-  Lanes separation;        // m, at the start of the step
-  Lanes impulse;           // N s, accumulated, of this sub-step
-  Lanes carried;           // N s, likewise, at the start of the step
-  Lanes arm;               // m, from the friction centre, for the twist limit
+  Lanes mass;        // effective mass along the normal, kg; 0: there is no such point
+  Lanes separation;  // m, at the start of the step
+  Lanes impulse;     // N s, accumulated, of this sub-step
+  Lanes carried;     // N s, that the spring need not give: see kCarriedShare
+  Lanes arm;         // m, from the friction centre, for the twist limit
 };
 
 // Up to four contacts that share no moving body. Lanes that are not in use are all zero, and stay so.
@@ -77,8 +77,15 @@ struct LaneInput {
   bool moving;  // b is not static
 };
 // Where in those numbers.
-enum RecordNumber { kRecordNormal = 0, kRecordOffset = 3, kRecordOrientationA = 6, kRecordOrientationB = 10,
-                    kRecordFriction = 14, kRecordTwist = 17, kRecordPoints = 18 };
+enum RecordNumber {
+  kRecordNormal = 0,
+  kRecordOffset = 3,
+  kRecordOrientationA = 6,
+  kRecordOrientationB = 10,
+  kRecordFriction = 14,
+  kRecordTwist = 17,
+  kRecordPoints = 18
+};
 enum PointNumber { kPointArmA = 0, kPointArmB = 3, kPointImpulse = 6, kPointNumbers = 7 };
 constexpr int kRecordNumbers = kRecordPoints + 4 * kPointNumbers;
 

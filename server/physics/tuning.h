@@ -28,17 +28,17 @@ constexpr double kContactHertzCap = 1000;              // Hz
 constexpr double kContactDampingRatio = 10;
 constexpr double kStaticHertzFactor = 2;      // contacts with static bodies are stiffer ...
 constexpr double kStaticDampingFactor = 0.5;  // ... and less damped
-// Springs give under a load. They give less where what a contact's points carried in the last step, on average, need not
-// be asked of them: at rest only the other half. (All of it lets towers sway: nothing holds the whole contact then. Each
-// point's own makes stacks bend: nothing rights what tilts.)
+// Springs give under a load. They give less where what a contact's points carried in the last step, on average, need
+// not be asked of them: at rest only the other half. (All of it lets towers sway: nothing holds the whole contact then.
+// Each point's own makes stacks bend: nothing rights what tilts.)
 constexpr double kCarriedShare = 0.5;
-constexpr double kTurnedFar = 0.2;            // rad; from there on it is not certain what still overlaps
-constexpr double kPushOutSpeed = 3;           // m/s, limit for removing penetration
-constexpr double kTouching = 0.005;           // m; of a new contact, points this near share its friction alike
-constexpr double kMovingSpeed = 0.01;         // m/s; faster against each other, angular momentum is kept to the last
-constexpr double kOwedTurn = 0.05;            // rad per step, by which paying back may always turn a body
-constexpr double kOwedShare = 0.1;            // of two bodies' energy, that paying angular momentum back may cost
-constexpr double kRestitutionThreshold = 1;   // m/s; slower approaches do not bounce
+constexpr double kTurnedFar = 0.2;           // rad; from there on it is not certain what still overlaps
+constexpr double kPushOutSpeed = 3;          // m/s, limit for removing penetration
+constexpr double kTouching = 0.005;          // m; of a new contact, points this near share its friction alike
+constexpr double kMovingSpeed = 0.01;        // m/s; faster against each other, angular momentum is kept to the last
+constexpr double kOwedTurn = 0.05;           // rad per step, by which paying back may always turn a body
+constexpr double kOwedShare = 0.1;           // of two bodies' energy, that paying angular momentum back may cost
+constexpr double kRestitutionThreshold = 1;  // m/s; slower approaches do not bounce
 constexpr double kImpactReach = 1.001;  // of what is covered in a sub-step: whoever just touches at its end strikes
 constexpr int kImpactIterations = 16;   // over the points of one manifold
 constexpr int kMostImpactRounds = 64;   // over an island, in one sub-step; what strikes later is stopped

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <cstring>
+#include <numbers>
 
 #include "physics_scenes.h"
+#include "server/physics/tuning.h"
 
 namespace soda::physics::test {
 namespace {
@@ -241,6 +243,21 @@ TEST(Collision, FastBallsDoNotTunnelThroughAThinWall) {
       EXPECT_LT(world.set.bodies[0].position[0], 0) << speed << " m/s, phase " << phase;
       EXPECT_LT(world.set.bodies[1].position[0], 0) << speed << " m/s, phase " << phase;
     }
+}
+
+TEST(Contact, SinksByHalfOfWhatItsSpringGives) {
+  SceneBuilder builder("at rest");
+  builder.scene.sleeping = false;
+  builder.scene.substeps = 4;
+  builder.add(Sphere{0.5}, Vec3(0, 0, 0.5));
+  builder.add_ground(200);
+  World world(builder);
+  world.run_for(5);
+  // A spring of that frequency gives by g / w^2 under the weight that hangs on it.
+  const double rate = 4 / builder.scene.dt;
+  const double w = 2 * std::numbers::pi * kStaticHertzFactor * kContactHertzPerSubstepRate * rate;
+  const double given = kG / (w * w), sunk = 0.5 - world.set.bodies[0].x().z();
+  EXPECT_NEAR(sunk, (1 - kCarriedShare) * given, 0.01 * given);
 }
 
 TEST(Contact, BodiesThatTipOverDoNotSinkIn) {
