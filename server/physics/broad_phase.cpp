@@ -32,22 +32,20 @@ bool wanted(std::uint8_t a, std::uint8_t b) {
 
 }  // namespace
 
-BroadPhase::Around BroadPhase::around(const Aabb& box) {
-  constexpr float kBeyond = 0x1p-22f, kLeast = 1e-30f;  // more than rounding takes away, twice
-  Around result{};
+BroadPhase::Rounded BroadPhase::rounded(const Aabb& box) {
+  Rounded result{};
   for (int axis = 0; axis < 3; ++axis) {
-    const auto low = static_cast<float>(box.min[axis]), high = static_cast<float>(box.max[axis]);
-    result.min[axis] = low - (std::abs(low) * kBeyond + kLeast);
-    result.max[axis] = high + (std::abs(high) * kBeyond + kLeast);
+    result.min[axis] = static_cast<float>(box.min[axis]);
+    result.max[axis] = static_cast<float>(box.max[axis]);
   }
   return result;
 }
 
-bool BroadPhase::may_overlap(const Around& l, const Around& r) {
-  const auto all = (l.min <= r.max) & (r.min <= l.max);
-  using Halves = long long __attribute__((vector_size(sizeof all)));
-  const auto halves = reinterpret_cast<Halves>(all);
-  return (halves[0] & halves[1]) == -1;
+bool BroadPhase::may_overlap(const Rounded& l, const Rounded& r) {
+  const auto apart = (l.min > r.max) | (r.min > l.max);  // neither is it where one is not a number
+  using Halves = long long __attribute__((vector_size(sizeof apart)));
+  const auto halves = reinterpret_cast<Halves>(apart);
+  return (halves[0] | halves[1]) == 0;
 }
 
 void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t> roles, double cell, Pairs& pairs) {
@@ -85,13 +83,13 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
   }
   for (std::size_t k = 0; k < table; ++k) buckets_[k + 1] += buckets_[k];
   entries_.resize(n - large_.size());
-  arounds_.resize(entries_.size());
+  rounded_.resize(entries_.size());
   for (std::size_t i = n; i-- > 0;) {  // backwards: ends with buckets_[k] = first entry, entries ascending by body
     if (bucket_of_[i] == kLarge) continue;
     const At c = centre_cell(boxes[i]);
     const std::uint32_t at = --buckets_[bucket_of_[i] + 1];
     entries_[at] = {c.x, c.y, c.z, static_cast<std::uint32_t>(i)};
-    arounds_[at] = around(boxes[i]);
+    rounded_[at] = rounded(boxes[i]);
   }
   // buckets_[k + 1] now holds the first entry of bucket k, buckets_[k + 2] that of the next one.
   const auto first_of = [&](std::uint64_t k) { return buckets_[k + 1]; };
@@ -107,12 +105,12 @@ void BroadPhase::find(std::span<const Aabb> boxes, std::span<const std::uint8_t>
   const auto scan = [&](std::uint32_t e, std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z,
                         std::uint32_t from, auto&& skip) {
     const Entry& entry = entries_[e];
-    const Around about = arounds_[e];
+    const Rounded box = rounded_[e];
     const std::uint64_t k = bucket(x0, y, z);
     const auto width = static_cast<std::uint32_t>(x1 - x0);
     const auto look = [&](std::uint64_t first, std::uint64_t last) {
       for (std::uint32_t o = std::max(first_of(first), from), end = end_of(last); o < end; ++o) {
-        if (!may_overlap(about, arounds_[o])) continue;
+        if (!may_overlap(box, rounded_[o])) continue;
         // Buckets hold other cells, too.
         const Entry& other = entries_[o];
         const bool here = other.y == y && other.z == z && static_cast<std::uint32_t>(other.x - x0) <= width;

@@ -34,20 +34,20 @@ class BroadPhase {
   void find(std::span<const Aabb> boxes, std::span<const std::uint8_t> roles, double cell, Pairs& pairs);
 
  private:
-  // A box about a body's, in single precision: half the memory, and four comparisons at once. Whose do not overlap,
-  // theirs do not.
+  // A body's box in single precision: half the memory, and four comparisons at once. Rounding keeps order, so whose
+  // rounded boxes are apart are apart.
   using Floats = float __attribute__((vector_size(4 * sizeof(float))));
-  struct Around {
+  struct Rounded {
     Floats min, max;  // x, y, z, 0
   };
-  static Around around(const Aabb& box);
-  static bool may_overlap(const Around& l, const Around& r);
+  static Rounded rounded(const Aabb& box);
+  static bool may_overlap(const Rounded& l, const Rounded& r);
 
   struct Entry {
     std::int32_t x, y, z;  // the cell of its centre
     std::uint32_t body;
   };
-  std::vector<Around> arounds_;  // by position in entries_, as those sorted by bucket
+  std::vector<Rounded> rounded_;  // by position in entries_
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> buckets_, bucket_of_, large_;
   std::vector<std::uint64_t> found_;

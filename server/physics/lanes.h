@@ -8,10 +8,4 @@ namespace soda::physics {
 
 inline Vec3 get(const Lanes3& from, int lane) { return Vec3(from.x[lane], from.y[lane], from.z[lane]); }
 
-inline void put(Lanes3& to, int lane, const Vec3& v) {
-  to.x[lane] = v.x();
-  to.y[lane] = v.y();
-  to.z[lane] = v.z();
-}
-
 }  // namespace soda::physics

@@ -35,6 +35,7 @@ constexpr double kCarriedShare = 0.5;
 constexpr double kTurnedFar = 0.2;           // rad; from there on it is not certain what still overlaps
 constexpr double kPushOutSpeed = 3;          // m/s, limit for removing penetration
 constexpr double kTouching = 0.005;          // m; of a new contact, points this near share its friction alike
+constexpr double kFaintImpulse = 1e-100;     // N s; contacts that carried less are as new ones
 constexpr double kMovingSpeed = 0.01;        // m/s; faster against each other, angular momentum is kept to the last
 constexpr double kOwedTurn = 0.05;           // rad per step, by which paying back may always turn a body
 constexpr double kOwedShare = 0.1;           // of two bodies' energy, that paying angular momentum back may cost

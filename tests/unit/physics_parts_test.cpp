@@ -70,6 +70,29 @@ TEST(BroadPhase, FindsExactlyTheOverlappingPairs) {
   EXPECT_GT(found, 1000u);
 }
 
+// What touches, or overlaps by the last bit, meets; what is apart by the last bit does not. At the places where scenes
+// are, and where single precision ends.
+TEST(BroadPhase, TheLastBitDecides) {
+  BroadPhase broad;
+  const std::vector<std::uint8_t> roles(2, kRoleWanted | kRoleAwake);
+  Random random(23);
+  for (const double place : {0.0, 0.1, 1.0, 1e3, 1e6, 1e7, 1e30, 1e38, 1e39, 1e300})
+    for (int trial = 0; trial < 60; ++trial) {
+      const int axis = trial % 3;
+      const double edge = place * (1 + random.between(-0.5, 0.5)) + random.between(0.01, 0.4);
+      const double size = std::max(0.3, 1e-3 * place);
+      std::vector<Aabb> boxes(2, {Vec3::Constant(place - size), Vec3::Constant(place + size)});
+      boxes[0].max[axis] = edge;
+      boxes[0].min[axis] = edge - size;
+      boxes[1].min[axis] = trial % 2 ? edge : std::nextafter(edge, HUGE_VAL);
+      boxes[1].max[axis] = edge + size;
+      if (random.below(2) == 0) std::swap(boxes[0], boxes[1]);
+      Pairs pairs;
+      broad.find(boxes, roles, 4 * size, pairs);
+      EXPECT_EQ(pairs.partners.size(), trial % 2 ? 1u : 0u) << place << ", trial " << trial;
+    }
+}
+
 TEST(BroadPhase, BoxesThatAreNotNumbersMeetNobodyAndHarmNobody) {
   std::vector<Aabb> boxes(3, {Vec3::Zero(), Vec3::Ones()});
   boxes[1].min = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());

@@ -17,7 +17,7 @@ export interface SodaDebug {
   frameMilliseconds(): number; // JavaScript per picture, mean of the last second
   bodyPosition(id: Id): [number, number, number] | null;
   screenPosition(id: Id): [number, number] | null; // CSS pixels on the page
-  bodyAt(x: number, y: number): bigint | null; // that a click there would meet
+  bodyAt(x: number, y: number): bigint | null; // that a click on the canvas there would meet
   readonly rollbacks: readonly RollbackRecord[];
   readonly answers: readonly AnswerRecord[];
   connected(): boolean;

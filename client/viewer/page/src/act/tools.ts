@@ -219,6 +219,4 @@ export class Tools {
     this.grabbing = null;
     this.views.controls.enabled = true;
   }
-
-  // A ray through the pointer.
 }

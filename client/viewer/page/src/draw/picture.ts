@@ -162,7 +162,7 @@ export class Picture {
     return [box.left + (0.5 + 0.5 * at.x) * box.width, box.top + (0.5 - 0.5 * at.y) * box.height];
   }
 
-  // The id of the body that a click there would meet, in CSS pixels of the page; null: none.
+  // The id of the body that a click on the canvas there would meet, in CSS pixels of the page; null: none.
   bodyAt(x: number, y: number): bigint | null {
     const hit = this.picker.pick(this.stage.rayAt({ clientX: x, clientY: y }));
     return hit && hit.body >= 0 ? this.bodies.ids[hit.body]! : null;
