@@ -84,7 +84,7 @@ void IslandSolver::add(std::span<const MovingBody> bodies, std::uint32_t a, std:
     fresh.points = 0;
     fresh.bounces = false;
     fresh.friction = fresh.restitution = fresh.moves_on_a = Lanes{};
-    fresh.bias_rate = fresh.mass_scale = fresh.impulse_scale = Lanes{};
+    fresh.bias_rate = fresh.mass_scale = fresh.impulse_scale = fresh.carried_share = Lanes{};
     lanes_ = 0;
   }
   Batch& batch = batches_[used_ - 1];
@@ -103,6 +103,7 @@ void IslandSolver::add(std::span<const MovingBody> bodies, std::uint32_t a, std:
   batch.bias_rate[lane] = soft.bias_rate;
   batch.mass_scale[lane] = soft.mass_scale;
   batch.impulse_scale[lane] = soft.impulse_scale;
+  batch.carried_share[lane] = surface.half_octaves > 2 * kLeastSubstepLevel ? kCarriedShare : 0;
   const auto motion = [](const MovingBody& body) { return reinterpret_cast<const Motion*>(&body); };
   LaneInput& input = inputs_[lane];
   input.record = record.normal;

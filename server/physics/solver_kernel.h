@@ -56,6 +56,7 @@ struct Batch {
   Lanes inverse_mass_a, inverse_mass_b;  // 1/kg
   Lanes friction, restitution, moves_on_a;
   Lanes bias_rate, mass_scale, impulse_scale;  // of soft contacts
+  Lanes carried_share;                         // see kCarriedShare
   Lanes3 normal, tangent[2];
   BatchPoint point[4];
   Row slide[2];

@@ -30,7 +30,8 @@ constexpr double kStaticHertzFactor = 2;      // contacts with static bodies are
 constexpr double kStaticDampingFactor = 0.5;  // ... and less damped
 // Springs give under a load. They give less where what a contact's points carried in the last step, on average, need
 // not be asked of them: at rest only the other half. (All of it lets towers sway: nothing holds the whole contact then.
-// Each point's own makes stacks bend: nothing rights what tilts.)
+// Each point's own makes stacks bend: nothing rights what tilts.) Only where an island has chosen to be stiffer than
+// the least: in shallow piles few bodies rock on each other, which what they carried before keeps up.
 constexpr double kCarriedShare = 0.5;
 constexpr double kTurnedFar = 0.2;           // rad; from there on it is not certain what still overlaps
 constexpr double kPushOutSpeed = 3;          // m/s, limit for removing penetration
