@@ -20,9 +20,13 @@ constexpr auto kDrawEvery = 200ms;
 constexpr auto kLineEvery = 5s;
 constexpr auto kSpeedOver = 1s;
 
-std::size_t terminal_rows() {
+struct TerminalSize {
+  std::size_t rows = 24, columns = 80;
+};
+TerminalSize terminal_size() {
   winsize size{};
-  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row > 0 ? size.ws_row : 24;
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_row == 0 || size.ws_col == 0) return {};
+  return {size.ws_row, size.ws_col};
 }
 
 double real_seconds(const Collector& collector, Table::Clock::time_point now) {
@@ -71,7 +75,9 @@ double Table::Speed::at(Clock::time_point now, Step final_now) {
 
 void Table::update(const Collector& collector) {
   const auto now = Clock::now();
-  if (quiet_ || !collector.session() || now < next_) return;
+  if (quiet_ || !collector.session()) return;
+  (void)total_.at(now, collector.whole_steps());  // so that the first line can tell it
+  if (now < next_) return;
   next_ = now + (terminal_ ? Clock::duration(kDrawEvery) : Clock::duration(kLineEvery));
   speeds_.resize(collector.worlds().size());
   if (terminal_)
@@ -82,9 +88,10 @@ void Table::update(const Collector& collector) {
 
 void Table::draw(const Collector& collector, Clock::time_point now) {
   std::vector<std::string> lines;
-  lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}  {}", "world", "cells", "bodies",
-                              "clock", "final", "steps/s", "syncs", "repairs", "waiting", "state"));
-  const std::size_t room = std::max<std::size_t>(4, terminal_rows()) - 3;
+  const TerminalSize terminal = terminal_size();
+  lines.push_back(fmt::format("{:>5} {:<12} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}", "world", "state", "cells",
+                              "bodies", "clock", "final", "steps/s", "waiting", "syncs", "repairs"));
+  const std::size_t room = std::max<std::size_t>(4, terminal.rows) - 3;
   const auto& worlds = collector.worlds();
   for (std::size_t i = 0; i < worlds.size(); ++i) {
     const wire::Status& s = worlds[i];
@@ -92,9 +99,9 @@ void Table::draw(const Collector& collector, Clock::time_point now) {
     if (lines.size() >= room && i + 1 < worlds.size()) continue;
     const auto heard = collector.heard(s.world());
     const char* state = !heard ? "not here yet" : now - *heard > dds::kSilence ? "silent" : state_name(s.state());
-    lines.push_back(fmt::format("{:>5} {:>8} {:>8} {:>9} {:>9} {:>9.0f} {:>9} {:>9} {:>8.2f}s  {}", s.world(),
-                                s.cells(), s.bodies(), s.clock(), s.final_step(), speed, s.syncs(), s.rollbacks(),
-                                s.waiting_seconds(), state));
+    lines.push_back(fmt::format("{:>5} {:<12} {:>8} {:>8} {:>9} {:>9} {:>9.0f} {:>8.2f}s {:>9} {:>9}", s.world(), state,
+                                s.cells(), s.bodies(), s.clock(), s.final_step(), speed, s.waiting_seconds(), s.syncs(),
+                                s.rollbacks()));
   }
   if (lines.size() < worlds.size() + 1) lines.insert(lines.end() - 1, fmt::format("{:>5}", "..."));
   const double speed = total_.at(now, collector.whole_steps());
@@ -102,7 +109,8 @@ void Table::draw(const Collector& collector, Clock::time_point now) {
                               progress(collector, now), speed, speed * collector.session()->dt()));
   std::string out;
   if (drawn_ > 0) out += fmt::format("\x1b[{}A", drawn_);
-  for (const std::string& line : lines) out += "\x1b[2K" + line + "\n";
+  // A line that wraps would be two, of which the next drawing knows nothing.
+  for (const std::string& line : lines) out += "\x1b[2K" + line.substr(0, terminal.columns - 1) + "\n";
   for (int extra = static_cast<int>(lines.size()); extra < drawn_; ++extra) out += "\x1b[2K\n";
   drawn_ = std::max(drawn_, static_cast<int>(lines.size()));
   std::fputs(out.c_str(), stderr);

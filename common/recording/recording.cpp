@@ -36,7 +36,7 @@ struct BlockHeader {
 };
 static_assert(sizeof(BlockHeader) == 16, "written as it is");
 
-// Reads blocks until the end, or until one that is not whole, which `cut` then tells.
+// Reads blocks until the end, or until one that is not whole or damaged, which `cut` then tells.
 class Blocks {
  public:
   Blocks(std::ifstream& file, std::string& cut) : file_(file), cut_(cut) {}
@@ -46,25 +46,31 @@ class Blocks {
     file_.read(reinterpret_cast<char*>(&header), sizeof header);
     if (file_.gcount() == 0) return std::nullopt;
     if (file_.gcount() != sizeof header) return stop("it ends in the middle of a block");
-    if (header.decompressed > kMaxBlock || header.length > kMaxBlock) return stop("a block of impossible length");
+    if (header.decompressed > kMaxBlock || header.length > kMaxBlock) return damaged("a block of impossible length");
     bytes_.resize(header.length);
     file_.read(bytes_.data(), header.length);
     if (file_.gcount() != static_cast<std::streamsize>(header.length)) return stop("it ends in the middle of a block");
-    if (XXH3_64bits(bytes_.data(), bytes_.size()) != header.checksum) return stop("a block is damaged");
+    if (XXH3_64bits(bytes_.data(), bytes_.size()) != header.checksum) return damaged("a block is damaged");
     std::string raw(header.decompressed, '\0');
     const std::size_t n = ZSTD_decompress(raw.data(), raw.size(), bytes_.data(), bytes_.size());
     pb::RecordedBlock block;
-    if (ZSTD_isError(n) || n != raw.size() || !block.ParseFromString(raw)) return stop("a block is damaged");
+    if (ZSTD_isError(n) || n != raw.size() || !block.ParseFromString(raw)) return damaged("a block is damaged");
     return block;
   }
+  bool are_damaged() const { return damaged_; }
 
  private:
+  std::nullopt_t damaged(const char* why) {
+    damaged_ = true;
+    return stop(why);
+  }
   std::nullopt_t stop(const char* why) {
     cut_ = why;
     return std::nullopt;
   }
   std::ifstream& file_;
   std::string& cut_;
+  bool damaged_ = false;
   std::string bytes_;
 };
 
@@ -192,6 +198,7 @@ Recording load_recording(const std::filesystem::path& path, bool with_poses) {
       recording.complete = recording.complete || item.end();
     }
   }
+  recording.damaged = blocks.are_damaged();
   if (!has_scene || recording.digests.empty())
     throw RecordingError(name + ": is cut off before its first step" +
                          (recording.cut.empty() ? "" : " (" + recording.cut + ")"));

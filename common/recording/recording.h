@@ -67,6 +67,7 @@ struct Recording {
   std::vector<pb::RecordedPoses> poses;  // good, in order, none after the last digest
   bool complete = false;                 // the run came to its end
   std::string cut;                       // why the file is not whole, or ""
+  bool damaged = false;                  // since somebody has changed it, or a disk
 };
 
 // Throws RecordingError, which names `file`, unless each body has a place and a unit quaternion.
