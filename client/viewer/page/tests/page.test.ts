@@ -158,6 +158,18 @@ describe('the page', { skip: existsSync(chromium) ? false : 'there is no chromiu
     await other.close();
   });
 
+  test('has its layout before anything is told', async () => {
+    const mute = await startMock(port + 300, ['--mute']);
+    const context = await browser.newContext({ viewport: { width: 1280, height: 800 } });
+    const page = await context.newPage();
+    await page.goto(`http://127.0.0.1:${port + 300}/#quality=minimal`);
+    await page.waitForFunction(() => window.soda, null, limit);
+    const height = await page.evaluate(() => document.querySelector('#view')!.getBoundingClientRect().height);
+    mute.kill();
+    assert.ok(height > 500, `the scene's part is ${height} pixels high`);
+    await context.close();
+  });
+
   test('connects again when the gateway comes back, and the scene is whole', async () => {
     mock.kill();
     await page.waitForFunction(() => !window.soda.connected(), null, limit);

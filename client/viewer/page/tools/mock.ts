@@ -30,10 +30,11 @@ const { values: options } = parseArgs({
     replay: { type: 'boolean', default: false },
     gather: { type: 'string', default: '0' }, // s until the run begins
     end: { type: 'string', default: '0' }, // s until the session ends; 0: never
+    mute: { type: 'boolean', default: false }, // lets pages connect, and tells them nothing
   },
 });
 if (options.help) {
-  console.log('mock [--port N] [--bodies N] [--worlds N] [--scene city|cubes] [--token T] [--plain] [--trouble] [--balance] [--replay] [--gather S] [--end S]');
+  console.log('mock [--port N] [--bodies N] [--worlds N] [--scene city|cubes] [--token T] [--plain] [--trouble] [--balance] [--replay] [--gather S] [--end S] [--mute]');
   process.exit(0);
 }
 
@@ -195,6 +196,7 @@ const server = createServer((request, response) => {
   );
 });
 new WebSocketServer({ server, path: '/ws' }).on('connection', (socket, request) => {
+  if (options.mute) return;
   const token = new URL(request.url ?? '/', 'http://mock').searchParams.get('token');
   const client = new Client(socket, token === options.token);
   client.send({

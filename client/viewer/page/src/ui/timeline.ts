@@ -78,6 +78,7 @@ export class Timeline {
     );
     this.holdButton.addEventListener('click', () => this.toggleHold());
     this.canvas = h('canvas', { class: 'bars', 'aria-hidden': 'true' });
+    this.canvas.style.height = `${barsHeight(1)}px`; // until something is told: a canvas by itself fills the page
     this.names = h('div', { class: 'row-names' });
     this.handle = h('div', { class: 'handle', role: 'slider', tabindex: 0, 'aria-label': 'Step that is shown' });
     this.track = h('div', { class: 'track' }, this.canvas, this.handle);
