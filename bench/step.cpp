@@ -88,6 +88,18 @@ Overlap overlap(const physics::Model& model, std::span<const BodyState> bodies) 
   return {depths.back(), depths[depths.size() * 99 / 100]};
 }
 
+// How far bodies without a drive have moved, mean, m: at rest, not at all.
+constexpr int kRestBlocks = 4;  // the last so many of a run: 2 s
+double moved(const Scene& scene, std::span<const Vec3> before, const std::function<Vec3(std::size_t)>& position) {
+  double sum = 0, count = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (scene.bodies[i].drive) continue;
+    sum += (position(i) - before[i]).norm();
+    ++count;
+  }
+  return sum / count;
+}
+
 // Ours with four sub-steps throughout, ours with what each island needs, and stock Bullet.
 enum Side { kFour, kChosen, kBullet, kSides };
 
@@ -96,6 +108,7 @@ struct Measured {
   physics::StageTimes stages;                       // of kFour: ms per step, mean over all rounds
   Standing standing[kSides];
   Overlap overlap[kSides];
+  double moved[kSides] = {};
   double contacts = 0;  // records at the end
 };
 
@@ -123,14 +136,21 @@ void measure_round(const Scene& scene, const SceneCase& c, int blocks, int round
   Ours four(scene, 4), chosen(scene, 0);
   BulletWorld bullet(scene);
   const std::function<void()> steps[kSides] = {[&] { four.step(); }, [&] { chosen.step(); }, [&] { bullet.step(); }};
+  const std::function<Vec3(std::size_t)> position[kSides] = {[&](std::size_t i) { return four.set.bodies[i].x(); },
+                                                             [&](std::size_t i) { return chosen.set.bodies[i].x(); },
+                                                             [&](std::size_t i) { return bullet.position(i); }};
+  std::vector<Vec3> before[kSides];
   for (int side = 0; side < kSides; ++side) m.blocks[side].resize(blocks);
-  for (int b = 0; b < blocks; ++b)
+  for (int b = 0; b < blocks; ++b) {
+    for (int side = 0; side < kSides && b == blocks - kRestBlocks; ++side)
+      for (std::size_t i = 0; i < four.set.bodies.size(); ++i) before[side].push_back(position[side](i));
     for (int turn = 0; turn < kSides; ++turn) {
       const int side = (turn + round) % kSides;
       const double start = cpu_seconds();
       for (int i = 0; i < kBlock; ++i) steps[side]();
       m.blocks[side][b].push_back(1e3 * (cpu_seconds() - start) / kBlock);
     }
+  }
   const double scale = 1e3 / (kBlock * blocks * rounds);
   const auto& times = four.times();
   m.stages.boxes += scale * times.boxes;
@@ -139,9 +159,10 @@ void measure_round(const Scene& scene, const SceneCase& c, int blocks, int round
   m.stages.islands += scale * times.islands;
   m.stages.order += scale * times.order;
   m.stages.solve += scale * times.solve;
-  m.standing[kFour] = standing(scene, c, [&](std::size_t i) { return four.set.bodies[i].x(); });
-  m.standing[kChosen] = standing(scene, c, [&](std::size_t i) { return chosen.set.bodies[i].x(); });
-  m.standing[kBullet] = standing(scene, c, [&](std::size_t i) { return bullet.position(i); });
+  for (int side = 0; side < kSides; ++side) {
+    m.standing[side] = standing(scene, c, position[side]);
+    m.moved[side] = moved(scene, before[side], position[side]);
+  }
   const physics::Model model(scene);
   std::vector<BodyState> of_bullet;
   bullet.read(of_bullet);
@@ -239,7 +260,7 @@ void step(const Options& options, Headline& headline) {
   Csv table(options, "step",
             "scene,bodies,bullet_ms,soda_ms,chosen_ms,boxes_ms,broad_ms,narrow_ms,islands_ms,order_ms,solve_ms,"
             "stacks,standing,standing_chosen,standing_bullet,drift_m,drift_chosen_m,drift_bullet_m,sink_m,"
-            "sink_chosen_m,sink_bullet_m,overlap,overlap_chosen,overlap_bullet");
+            "sink_chosen_m,sink_bullet_m,overlap,overlap_chosen,overlap_bullet,moved_m,moved_chosen_m,moved_bullet_m");
   Csv course(options, "step_course", "scene,seconds,soda_ms,bullet_ms,chosen_ms");
   const char* const side_names[kSides] = {"", "_chosen", "_bullet"};
   for (SceneCase c : kScenes) {
@@ -264,6 +285,8 @@ void step(const Options& options, Headline& headline) {
     if (stacks)
       std::printf("; of %u stacks %u (%u) stand, with Bullet %u", stacks, m.standing[kFour].stacks,
                   m.standing[kChosen].stacks, m.standing[kBullet].stacks);
+    std::printf("; moved in the last 2 s, mean: %.2g m (%.2g), Bullet %.2g", m.moved[kFour], m.moved[kChosen],
+                m.moved[kBullet]);
     std::printf("; overlap of one contact in a hundred, of half extents: %.3f (%.3f), Bullet %.3f\n",
                 m.overlap[kFour].one_in_a_hundred, m.overlap[kChosen].one_in_a_hundred,
                 m.overlap[kBullet].one_in_a_hundred);
@@ -273,7 +296,7 @@ void step(const Options& options, Headline& headline) {
               m.stages.islands, m.stages.order, m.stages.solve, stacks, four.stacks, chosen.stacks, bullet.stacks,
               four.drift, chosen.drift, bullet.drift, four.sink, chosen.sink, bullet.sink,
               m.overlap[kFour].one_in_a_hundred, m.overlap[kChosen].one_in_a_hundred,
-              m.overlap[kBullet].one_in_a_hundred);
+              m.overlap[kBullet].one_in_a_hundred, m.moved[kFour], m.moved[kChosen], m.moved[kBullet]);
     const std::string name = c.name;
     headline.add(name + ".time_over_bullet", ms[kFour] / ms[kBullet]);
     headline.add(name + ".time_over_bullet_chosen", ms[kChosen] / ms[kBullet]);
@@ -290,6 +313,7 @@ void step(const Options& options, Headline& headline) {
       headline.add(name + ".ms_per_step" + of, ms[side]);
       headline.add(name + ".overlap" + of, m.overlap[side].one_in_a_hundred);
       headline.add(name + ".overlap_most" + of, m.overlap[side].most);
+      headline.add(name + ".moved" + of + "_m", m.moved[side]);
       if (!stacks) continue;
       headline.add(name + ".standing" + of, m.standing[side].stacks);
       headline.add(name + ".drift" + of + "_m", m.standing[side].drift);
