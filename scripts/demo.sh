@@ -5,7 +5,7 @@ set -euo pipefail
 bin=$1 worlds=${2:-4} bodies=${3:-3000} port=${4:-8080}
 folder=$(mktemp -d)
 session=demo-$$
-viewer= run=
+viewer=
 trap 'rm -rf "$folder"; [ -z "$viewer" ] || kill "$viewer" 2>/dev/null || true' EXIT
 "$bin/soda" scene make demo --bodies "$bodies" --seed 1 -o "$folder/demo.scene"
 if [ -e "$bin/../share/soda/viewer/index.html" ]; then

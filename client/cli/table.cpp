@@ -76,17 +76,17 @@ double Table::Speed::at(Clock::time_point now, Step final_now) {
 void Table::update(const Collector& collector) {
   const auto now = Clock::now();
   if (quiet_ || !collector.session()) return;
-  (void)total_.at(now, collector.whole_steps());  // so that the first line can tell it
+  const double speed = total_.at(now, collector.whole_steps());  // always, so that the first line can tell it
   if (now < next_) return;
   next_ = now + (terminal_ ? Clock::duration(kDrawEvery) : Clock::duration(kLineEvery));
   speeds_.resize(collector.worlds().size());
   if (terminal_)
-    draw(collector, now);
+    draw(collector, now, speed);
   else if (collector.began())
-    print_line(collector, now);
+    print_line(collector, now, speed);
 }
 
-void Table::draw(const Collector& collector, Clock::time_point now) {
+void Table::draw(const Collector& collector, Clock::time_point now, double total_speed) {
   std::vector<std::string> lines;
   const TerminalSize terminal = terminal_size();
   lines.push_back(fmt::format("{:>5} {:<12} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}", "world", "state", "cells",
@@ -104,9 +104,8 @@ void Table::draw(const Collector& collector, Clock::time_point now) {
                                 s.rollbacks()));
   }
   if (lines.size() < worlds.size() + 1) lines.insert(lines.end() - 1, fmt::format("{:>5}", "..."));
-  const double speed = total_.at(now, collector.whole_steps());
   lines.push_back(fmt::format("{} bodies, {}, {:.0f} steps/s, {:.2f} x real time", collector.bodies(),
-                              progress(collector, now), speed, speed * collector.session()->dt()));
+                              progress(collector, now), total_speed, total_speed * collector.session()->dt()));
   std::string out;
   if (drawn_ > 0) out += fmt::format("\x1b[{}A", drawn_);
   // A line that wraps would be two, of which the next drawing knows nothing.
@@ -116,8 +115,7 @@ void Table::draw(const Collector& collector, Clock::time_point now) {
   std::fputs(out.c_str(), stderr);
 }
 
-void Table::print_line(const Collector& collector, Clock::time_point now) {
-  const double speed = total_.at(now, collector.whole_steps());
+void Table::print_line(const Collector& collector, Clock::time_point now, double speed) {
   std::string line = fmt::format("{}, {} bodies in {} worlds, {:.0f} steps/s", progress(collector, now),
                                  collector.bodies(), collector.worlds().size(), speed);
   for (const wire::Status& s : collector.worlds())

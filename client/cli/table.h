@@ -36,8 +36,8 @@ class Table {
     double at(Clock::time_point now, Step final_now);
   };
 
-  void draw(const Collector& collector, Clock::time_point now);
-  void print_line(const Collector& collector, Clock::time_point now);
+  void draw(const Collector& collector, Clock::time_point now, double speed);
+  void print_line(const Collector& collector, Clock::time_point now, double speed);
 
   const bool quiet_;
   const bool terminal_;

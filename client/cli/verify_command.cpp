@@ -52,9 +52,8 @@ void add_verify_command(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<VerifyOptions>();
   CLI::App* command = app.add_subcommand("verify", "simulate a recorded run again and compare every step");
   command->footer(
-      "Exit code: 0 when all steps that the recording has are equal (a run that was ended early has fewer); 1 if one "
-      "is\n"
-      "different, the file is damaged, or the run failed; 2 if it is no recording, or an option is wrong.");
+      "Exit code: 0 when all steps that the recording has are equal (a run that was ended early has fewer); 1 if one\n"
+      "is different, the file is damaged, or the run failed; 2 if it is no recording, or an option is wrong.");
   command->add_option("recording", o->recording, "file of `soda run --record`")->required();
   command->add_option("--worlds", o->worlds, "how many worlds; as many as were recorded if not given")
       ->check(CLI::Range(1u, dds::kMaxWorlds));

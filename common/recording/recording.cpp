@@ -36,10 +36,10 @@ struct BlockHeader {
 };
 static_assert(sizeof(BlockHeader) == 16, "written as it is");
 
-// Reads blocks until the end, or until one that is not whole or damaged, which `cut` then tells.
+// Reads blocks until the end, or until one that is not whole, or damaged, which it tells in the recording.
 class Blocks {
  public:
-  Blocks(std::ifstream& file, std::string& cut) : file_(file), cut_(cut) {}
+  Blocks(std::ifstream& file, Recording& recording) : file_(file), recording_(recording) {}
 
   std::optional<pb::RecordedBlock> next() {
     BlockHeader header{};
@@ -57,20 +57,18 @@ class Blocks {
     if (ZSTD_isError(n) || n != raw.size() || !block.ParseFromString(raw)) return damaged("a block is damaged");
     return block;
   }
-  bool are_damaged() const { return damaged_; }
 
  private:
   std::nullopt_t damaged(const char* why) {
-    damaged_ = true;
+    recording_.damaged = true;
     return stop(why);
   }
   std::nullopt_t stop(const char* why) {
-    cut_ = why;
+    recording_.cut = why;
     return std::nullopt;
   }
   std::ifstream& file_;
-  std::string& cut_;
-  bool damaged_ = false;
+  Recording& recording_;
   std::string bytes_;
 };
 
@@ -176,7 +174,7 @@ Recording load_recording(const std::filesystem::path& path, bool with_poses) {
                          std::to_string(kVersion));
   Recording recording;
   recording.scene_hash = header.scene_hash;
-  Blocks blocks(file, recording.cut);
+  Blocks blocks(file, recording);
   bool has_scene = false;
   std::vector<pb::RecordedAction> actions;
   while (const auto block = blocks.next()) {
@@ -198,7 +196,6 @@ Recording load_recording(const std::filesystem::path& path, bool with_poses) {
       recording.complete = recording.complete || item.end();
     }
   }
-  recording.damaged = blocks.are_damaged();
   if (!has_scene || recording.digests.empty())
     throw RecordingError(name + ": is cut off before its first step" +
                          (recording.cut.empty() ? "" : " (" + recording.cut + ")"));

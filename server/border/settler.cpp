@@ -296,7 +296,8 @@ void Settler::pass_on(Step step, const MixedIslands::Closure& closure) {
 // Whether `to` gets that part without this world: of its origin, or of one with a lower number that touches bodies of
 // both with one component, and so passes it on as soon as it has it. Only of who touches bodies of this world, and
 // tells it its part itself, is that certain: what others pass on of a part may be old. So, where those between touch
-// each other, each part comes once to each world that is two components away, and a chain of them passes every part on along itself.
+// each other, each part comes once to each world that is two components away, and a chain of them passes every part on
+// along itself.
 bool Settler::is_told_otherwise(Step step, const MixedIslands::Closure& closure, WorldId origin, WorldId to) const {
   const MixedIslands& parts = at(step).parts;
   return parts.touches(origin, to) || std::any_of(relays_.begin(), relays_.end(), [&](WorldId between) {
