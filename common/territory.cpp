@@ -2,21 +2,21 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <utility>
 
 namespace soda {
 namespace {
 
 struct Region {
-  Cell low, high;  // cells low .. high - 1 along each axis
-  std::size_t cells() const {
-    return static_cast<std::size_t>(high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]);
-  }
+  Cell low, high;        // cells low .. high - 1 along each axis
+  unsigned borders = 0;  // bit 2 * axis: at `low` another world's cells begin; bit 2 * axis + 1: likewise at `high`
 };
 
 // Something that costs, and where it is, in half cells from the grid's origin.
@@ -25,7 +25,8 @@ struct Weight {
   std::uint32_t cost;
 };
 constexpr std::uint32_t kDynamicCost = 8, kStaticCost = 1;  // of a body; of a static one in each cell that it lies in
-constexpr double kLargeStatic = 64;                         // cells: what lies in more is everywhere
+constexpr double kMostBorderShare = 0.125;  // of a world's own work: what one side of its territory may count
+constexpr double kLargeStatic = 64;         // cells: what lies in more is everywhere
 
 Weight weight_at(const Grid& grid, const Vec3& position, std::uint32_t cost) {
   const Cell cell = grid.cell_of(position);
@@ -52,31 +53,63 @@ void add_static(const Scene& scene, const Grid& grid, const Body& body, std::vec
 
 class Bisector {
  public:
-  // `last_axis` is cut only where no other can be; -1: all axes are alike.
-  Bisector(const Grid& grid, int last_axis, std::vector<WorldId>& owner)
-      : grid_(grid), last_axis_(last_axis), owner_(owner) {}
+  // `last_axis` is cut only where no other can be; -1: all axes are alike. `owner`: all 0. `straight`: territories are
+  // boxes of cells. `border`: the cost of a side of a territory behind which somebody is.
+  Bisector(const Grid& grid, int last_axis, bool straight, double border, std::vector<WorldId>& owner)
+      : grid_(grid), last_axis_(last_axis), straight_(straight), border_(border), owner_(owner) {}
 
-  // Gives `region`, in which `weights` are, to `count` worlds from `first` on. Reorders the weights.
+  // Gives world `first`'s cells, which are in `region` with `weights`, to `count` worlds from it on. Reorders the
+  // weights.
   void split(const Region& region, std::span<Weight> weights, WorldId first, WorldId count) {
-    if (count == 1) {
-      for_each(region, [&](const Cell& c) { owner_[grid_.index(c)] = first; });
-      return;
-    }
-    const WorldId lower = count / 2;
-    const Cut cut = best_cut(region, weights, lower, count);
+    if (count == 1) return;
+    const WorldId lower = count / 2, second = first + lower;
+    const Cut cut = best_cut(region, weights, first, lower, count);
     Region below = region, above = region;
     below.high[cut.axis] = above.low[cut.axis] = cut.at;
-    const auto axis = static_cast<std::size_t>(cut.axis);
+    below.borders |= 2u << 2 * cut.axis, above.borders |= 1u << 2 * cut.axis;
+    for_each(above, [&](const Cell& c) {
+      if (owner(c) == first) owner(c) = second;
+    });
+    if (!straight_) even_out(cut, weights, {first, lower}, {second, count - lower}, below, above);
     const auto middle =
-        std::partition(weights.begin(), weights.end(), [&](const Weight& w) { return w.at[axis] < 2 * cut.at; });
+        std::partition(weights.begin(), weights.end(), [&](const Weight& w) { return owner(cell_of(w)) == first; });
     split(below, {weights.begin(), middle}, first, lower);
-    split(above, {middle, weights.end()}, first + lower, count - lower);
+    split(above, {middle, weights.end()}, second, count - lower);
+  }
+
+  // Whether each world's cells are one piece, by faces.
+  bool all_connected(WorldId worlds) const {
+    std::vector<std::uint8_t> seen(owner_.size(), 0), begun(worlds, 0);
+    std::vector<Cell> todo;
+    bool connected = true;
+    for_each({{0, 0, 0}, grid_.size, 0}, [&](const Cell& start) {
+      if (seen[grid_.index(start)]) return;
+      connected = connected && !std::exchange(begun[owner(start)], 1);
+      todo.push_back(start);
+      seen[grid_.index(start)] = 1;
+      while (!todo.empty()) {
+        const Cell c = todo.back();
+        todo.pop_back();
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          for (const int way : {-1, 1}) {
+            Cell next = c;
+            next[axis] += way;
+            if (next[axis] < 0 || next[axis] >= grid_.size[axis] || owner(next) != owner(c)) continue;
+            if (!std::exchange(seen[grid_.index(next)], 1)) todo.push_back(next);
+          }
+      }
+    });
+    return connected;
   }
 
  private:
   struct Cut {
     int axis = 0;
     std::int32_t at = 0;
+    std::int64_t misplaced = 0;  // of the work below it, so much is too much
+  };
+  struct Side {
+    WorldId first, worlds;
   };
 
   template <typename F>
@@ -85,11 +118,36 @@ class Bisector {
       for (std::int32_t y = r.low[1]; y < r.high[1]; ++y)
         for (std::int32_t x = r.low[0]; x < r.high[0]; ++x) f(Cell{x, y, z});
   }
+  static Cell cell_of(const Weight& w) { return {w.at[0] >> 1, w.at[1] >> 1, w.at[2] >> 1}; }
+  WorldId& owner(const Cell& c) { return owner_[grid_.index(c)]; }
+  const WorldId& owner(const Cell& c) const { return owner_[grid_.index(c)]; }
+
+  // How much work the part below a cut across `axis` should have, so that all worlds have as much to do with that and
+  // their borders. Some square root of a part's worlds lie along one of its sides.
+  std::int64_t wanted_below(const Region& region, int axis, std::uint64_t total, WorldId lower, WorldId count) const {
+    const double mean = static_cast<double>(total) / count;
+    const double border = std::min(border_, kMostBorderShare * mean);
+    const auto at_borders = [&](unsigned borders, WorldId worlds) {
+      return border * std::popcount(borders) * std::sqrt(static_cast<double>(worlds));
+    };
+    const double below = at_borders(region.borders | 2u << 2 * axis, lower),
+                 above = at_borders(region.borders | 1u << 2 * axis, count - lower);
+    return std::llround((static_cast<double>(total) + below + above) * lower / count - below);
+  }
 
   // The cut that costs least: bodies on the wrong side are work that one half does while the other waits; bodies within
   // half a cell of the cut are told to the other side, and their islands are solved by both. Where that says nothing
   // (empty regions), short borders and even halves. Integers only, so that every process agrees.
-  Cut best_cut(const Region& region, std::span<const Weight> weights, WorldId lower, WorldId count) const {
+  Cut best_cut(const Region& region, std::span<const Weight> weights, WorldId first, WorldId lower,
+               WorldId count) const {
+    std::array<std::vector<std::size_t>, 3> cells;  // by slice
+    std::size_t all_cells = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) cells[axis].assign(region.high[axis] - region.low[axis], 0);
+    for_each(region, [&](const Cell& c) {
+      if (owner(c) != first) return;
+      ++all_cells;
+      for (std::size_t axis = 0; axis < 3; ++axis) ++cells[axis][c[axis] - region.low[axis]];
+    });
     Cut best;
     bool found = false;
     std::tuple<bool, std::uint64_t, std::uint64_t> best_cost;
@@ -102,26 +160,98 @@ class Bisector {
         slice[static_cast<std::size_t>(w.at[static_cast<std::size_t>(axis)] - 2 * region.low[axis])] += w.cost;
         total += w.cost;
       }
-      const std::size_t face = region.cells() / length;
+      const std::size_t face = all_cells / length;
+      const std::int64_t wanted = wanted_below(region, axis, total, lower, count);
       std::uint64_t below = 0;
+      std::size_t cells_below = 0;
       for (std::int32_t i = 1; i < length; ++i) {
         below += slice[2 * i - 2] + slice[2 * i - 1];
+        cells_below += cells[axis][i - 1];
         // Each side must have a cell for each of its worlds.
-        if (face * i < lower || face * (length - i) < count - lower) continue;
-        const std::uint64_t wanted = total * lower / count;
-        const std::uint64_t misplaced = wanted > below ? wanted - below : below - wanted;
+        if (cells_below < lower || all_cells - cells_below < count - lower) continue;
+        const std::int64_t misplaced = static_cast<std::int64_t>(below) - wanted;
         const std::uint64_t near = slice[2 * i - 1] + slice[2 * i];
         const auto uneven = static_cast<std::uint64_t>(std::abs(2 * static_cast<std::int64_t>(i) - length));
-        const std::tuple cost{axis == last_axis_, 4 * misplaced + near, 10 * face + uneven};
-        if (!found || cost < best_cost) best = {axis, region.low[axis] + i}, best_cost = cost, found = true;
+        const std::tuple cost{axis == last_axis_, 4 * static_cast<std::uint64_t>(std::abs(misplaced)) + near,
+                              10 * face + uneven};
+        if (!found || cost < best_cost) best = {axis, region.low[axis] + i, misplaced}, best_cost = cost, found = true;
       }
     }
     if (!found) throw std::invalid_argument("territories: fewer cells than worlds in a part of the grid");
     return best;
   }
 
+  // Cells are coarse: of the slice at the cut on the side that has too much, some rows, from one end on, go to the
+  // other side, if that is worth the longer border.
+  void even_out(const Cut& cut, std::span<const Weight> weights, const Side& low, const Side& high, Region& below,
+                Region& above) {
+    const bool down = cut.misplaced > 0;  // the lower side gives
+    const Side &giver = down ? low : high, &taker = down ? high : low;
+    const auto axis = static_cast<std::size_t>(cut.axis);
+    const std::int32_t slice = down ? cut.at - 1 : cut.at;
+    std::size_t along = axis == 0 ? 1 : 0;  // the axis by which rows are counted: upright stay together what is
+    const Region& region = down ? below : above;
+    for (std::size_t a = 0; a < 3; ++a)
+      if (a != axis && static_cast<int>(a) != last_axis_ &&
+          (static_cast<int>(along) == last_axis_ ||
+           region.high[a] - region.low[a] > region.high[along] - region.low[along]))
+        along = a;
+    if (region.high[axis] - region.low[axis] < 2) return;
+
+    // By row: what there is in the slice; near the cut, and near where it would be if the row went over.
+    struct Row {
+      std::int64_t work = 0, near_here = 0, near_there = 0;
+      std::int64_t near_begin = 0, near_end = 0;  // in the slice, near the row's two ends
+    };
+    const auto count = static_cast<std::size_t>(region.high[along] - region.low[along]);
+    std::vector<Row> rows(count);
+    const std::int32_t there = down ? slice : slice + 1;
+    for (const Weight& w : weights) {
+      const std::int32_t at = cell_of(w)[along] - region.low[along];
+      if (at < 0 || at >= static_cast<std::int32_t>(count)) continue;
+      Row& row = rows[static_cast<std::size_t>(at)];
+      const auto is_near = [&](std::int32_t cut_at) {
+        return w.at[axis] == 2 * cut_at - 1 || w.at[axis] == 2 * cut_at;
+      };
+      if (is_near(cut.at)) row.near_here += w.cost;
+      if (is_near(there)) row.near_there += w.cost;
+      if (cell_of(w)[axis] != slice || owner(cell_of(w)) != giver.first) continue;
+      row.work += w.cost;
+      (w.at[along] % 2 == 0 ? row.near_begin : row.near_end) += w.cost;
+    }
+    std::int64_t best = 4 * std::abs(cut.misplaced);
+    for (const Row& row : rows) best += row.near_here;
+    const std::int64_t near_straight = best - 4 * std::abs(cut.misplaced);
+    std::size_t most = 0;
+    bool from_end = false;
+    for (const bool backwards : {false, true}) {
+      std::int64_t left = std::abs(cut.misplaced), near = near_straight;
+      for (std::size_t n = 1; n < count; ++n) {
+        const Row &moved = rows[backwards ? count - n : n - 1], &next = rows[backwards ? count - n - 1 : n];
+        left -= moved.work;
+        near += moved.near_there - moved.near_here;
+        const std::int64_t end = backwards ? moved.near_begin + next.near_end : moved.near_end + next.near_begin;
+        if (4 * std::abs(left) + near + end < best)
+          best = 4 * std::abs(left) + near + end, most = n, from_end = backwards;
+      }
+    }
+    if (most == 0) return;
+    Region moved = region;
+    moved.low[axis] = slice, moved.high[axis] = slice + 1;
+    if (from_end)
+      moved.low[along] = region.high[along] - static_cast<std::int32_t>(most);
+    else
+      moved.high[along] = region.low[along] + static_cast<std::int32_t>(most);
+    for_each(moved, [&](const Cell& c) {
+      if (owner(c) == giver.first) owner(c) = taker.first;
+    });
+    (down ? above.low : below.high)[axis] = down ? slice : slice + 1;
+  }
+
   const Grid& grid_;
   int last_axis_;
+  bool straight_;
+  double border_;
   std::vector<WorldId>& owner_;
 };
 
@@ -135,7 +265,7 @@ int axis_of_gravity(const Vec3& gravity) {
 
 }  // namespace
 
-TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds) {
+TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds, double border_bodies) {
   if (worlds == 0) throw std::invalid_argument("territories: at least one world is needed");
   if (worlds > grid.cells())
     throw std::invalid_argument(
@@ -150,10 +280,14 @@ TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds) {
       weights.push_back(
           weight_at(grid, body.pose.position + body.pose.orientation * body.inertial.centre, kDynamicCost));
   }
-  TerritoryMap map{grid, worlds, std::vector<WorldId>(grid.cells(), 0)};
-  Bisector(grid, axis_of_gravity(scene.gravity), map.owner)
-      .split({{0, 0, 0}, {grid.size[0], grid.size[1], grid.size[2]}}, weights, 0, worlds);
-  return map;
+  for (const bool straight : {false, true}) {
+    TerritoryMap map{grid, worlds, std::vector<WorldId>(grid.cells(), 0)};
+    Bisector bisector(grid, axis_of_gravity(scene.gravity), straight, border_bodies * kDynamicCost, map.owner);
+    std::vector<Weight> some = weights;
+    bisector.split({{0, 0, 0}, grid.size, 0}, some, 0, worlds);
+    if (straight || bisector.all_connected(worlds)) return map;
+  }
+  throw std::logic_error("territories: straight cuts are always possible");
 }
 
 TerritoryMap initial_territories(const Scene& scene, const Grid& grid, WorldId worlds) {

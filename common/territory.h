@@ -16,11 +16,17 @@ struct TerritoryMap {
   WorldId owner_of(const Vec3& position) const { return owner[grid.index(grid.cell_of(position))]; }
 };
 
-// Recursive bisection of the grid, weighted by what its cells will cost: boxes of cells with about the same work each,
-// cut where few bodies are, and upright. Dynamic bodies count, static things a little, for what comes there touches
-// them; large ones (grounds, walls across many cells) do not. Every world gets at least one cell. A pure function of
-// its arguments. Throws std::invalid_argument when there are more worlds than cells.
-TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds);
+// What a side of a territory behind which there are others costs, as so many bodies: messages, and their bodies near
+// the border. Measured with 1,000 bodies per world and 8 neighbours around it (docs/experiments.md). At most an eighth
+// of a world's mean work is counted for it.
+constexpr double kBorderBodies = 110;
+
+// Recursive bisection of the grid, weighted by what its cells will cost: connected territories with about the same work
+// each, cut where few bodies are, and upright; boxes of cells but for a part of a row at their ends where that makes
+// work more equal. Dynamic bodies count, static things a little, for what comes there touches them; large ones
+// (grounds, walls across many cells) do not; and borders. Every world gets at least one cell. A pure function of its
+// arguments. Throws std::invalid_argument when there are more worlds than cells.
+TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds, double border_bodies = kBorderBodies);
 
 // The territories that the scene gives by hand, if it does (Scene::territories), else those of bisect(); a world that
 // is alone has everything. Throws std::invalid_argument, too, where they are given to another number of worlds, or

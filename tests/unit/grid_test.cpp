@@ -118,6 +118,35 @@ TEST(Territories, AreConnectedBalancedAndComplete) {
   }
 }
 
+// Whole slices of cells are coarse: a part of a row goes over where that is worth it.
+TEST(Territories, AreEvenThoughCellsAreCoarse) {
+  const Scene scene = generate("city", 16000, 1);
+  const Grid grid = make_grid(scene);
+  constexpr WorldId kWorlds = 16;
+  const auto bodies_of = [&](const TerritoryMap& map) {
+    std::vector<double> bodies(kWorlds, 0);
+    for (const Body& body : scene.bodies)
+      if (!body.is_static) ++bodies[map.owner_of(body.pose.position)];
+    return bodies;
+  };
+  const TerritoryMap even = bisect(scene, grid, kWorlds, 0);
+  const std::vector<double> bodies = bodies_of(even);
+  for (WorldId w = 0; w < kWorlds; ++w) {
+    EXPECT_TRUE(connected(even, w)) << "world " << w;
+    EXPECT_NEAR(bodies[w], 1000, 40) << "world " << w;  // two columns of cells with a stack in each
+  }
+
+  // Who has others on all sides has fewer bodies, for borders cost something.
+  const std::vector<double> fewer = bodies_of(bisect(scene, grid, kWorlds));
+  const TerritoryMap map = bisect(scene, grid, kWorlds);
+  const auto at = [&](double x, double y) {
+    return fewer[map.owner_of(grid.origin + grid.edge * Vec3(x * grid.size[0], y * grid.size[1], 0.5))];
+  };
+  const double corners = at(0.1, 0.1) + at(0.1, 0.9) + at(0.9, 0.1) + at(0.9, 0.9);
+  const double middle = at(0.4, 0.4) + at(0.4, 0.6) + at(0.6, 0.4) + at(0.6, 0.6);
+  EXPECT_GT(corners, middle + 4 * 1.5 * kBorderBodies) << corners << " and " << middle;
+}
+
 TEST(Territories, AreAPureFunctionOfTheirArguments) {
   const Scene scene = generate("city", 500, 4);
   const Grid grid = make_grid(scene);
