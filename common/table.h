@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/prefetch.h"
+#include "common/recycled.h"
 #include "common/ref.h"
 
 namespace soda {
@@ -102,7 +103,7 @@ class Table {
 
  private:
   static constexpr std::size_t kPageSlots = 32, kGroupPages = 32, kGroupSlots = kPageSlots * kGroupPages;
-  struct Page {
+  struct Page : Recycled<Page> {
     std::uint32_t references = 0;
     std::array<Ref<T>, kPageSlots> slots;
     // What falls out of the window has long left the caches: all of it is asked for at once.
@@ -112,7 +113,7 @@ class Table {
       delete page;
     }
   };
-  struct Group {
+  struct Group : Recycled<Group> {
     std::uint32_t references = 0;
     std::array<Ref<Page>, kGroupPages> pages;
     friend void release(Group* group) {

@@ -17,51 +17,51 @@ void Announcer::add_link(Step newest) {
 
 // Of a body that stays here others need the records with bodies that may be theirs, and of two wide bodies, which whom
 // they reach looks at too; those with its own kind and with the ground matter here alone.
-std::vector<bool> Announcer::wanted(Step step, const timeline::Record& record) const {
-  std::vector<bool> wanted;
-  if (record.place.owner != context_.settings.me) return wanted;
-  bool all = true;
-  for (const ContactRecord& contact : record.contacts()) {
+std::uint64_t Announcer::wanted(Step step, const timeline::Record& record) const {
+  if (record.place.owner != context_.settings.me) return NearBody::kAll;
+  std::uint64_t wanted = NearBody::kAll;
+  const std::span<const ContactRecord> contacts = record.contacts();
+  for (std::size_t i = 0; i < std::min<std::size_t>(contacts.size(), 64); ++i) {
     bool needed = false;
-    if (!contact.with_static()) {
-      const timeline::Record* const partner = context_.timeline.produced(step, context_.timeline.slot_of(contact.b));
+    if (!contacts[i].with_static()) {
+      const timeline::Record* const partner =
+          context_.timeline.produced(step, context_.timeline.slot_of(contacts[i].b));
       needed = !partner || partner->place.owner != context_.settings.me || (record.place.wide && partner->place.wide);
     }
-    wanted.push_back(needed);
-    all = all && needed;
+    if (!needed) wanted &= ~(std::uint64_t{1} << i);
   }
-  if (all) wanted.clear();
   return wanted;
 }
 
 void Announcer::update(Step step) {
-  const std::vector<timeline::Slot> changed = context_.timeline.take_changed(step);
-  if (changed.empty() || books_.empty()) return;
-  std::vector<NearBodies> added(books_.size());
-  for (const timeline::Slot slot : changed) {
+  context_.timeline.take_changed(step, changed_);
+  if (changed_.empty() || books_.empty()) return;
+  added_.resize(books_.size());
+  for (NearBodies& added : added_) added.clear();
+  for (const timeline::Slot slot : changed_) {
     const Ref<timeline::Record> record = context_.timeline.share(step, slot);
-    if (!record || (record->place.inside && record->place.owner == context_.settings.me)) continue;
+    if (!record || context_.timeline.inside(*record)) continue;
     context_.neighbourhood.hearers(record->body, step, hearers_);
-    for (std::size_t l = 0; l < books_.size(); ++l)
-      if (std::binary_search(hearers_.begin(), hearers_.end(), context_.links[l].peer()))
-        added[l].push_back({slot, record, {}});
+    for (const WorldId hearer : hearers_)
+      if (const Link* const link = context_.link_to(hearer)) added_[link->index()].push_back({slot, record});
   }
   for (std::size_t l = 0; l < books_.size(); ++l) {
     const NearBodies& before = books_[l].truth(step);
-    if (before.empty() && added[l].empty()) continue;
+    if (before.empty() && added_[l].empty()) continue;
     NearBodies now;
-    now.reserve(before.size() + added[l].size());
-    auto add = added[l].begin();
-    auto gone = changed.begin();
+    now.reserve(before.size() + added_[l].size());
+    auto add = added_[l].begin();
+    auto gone = changed_.begin();
     for (const NearBody& body : before) {
-      for (; add != added[l].end() && add->slot < body.slot; ++add) now.push_back(std::move(*add));
-      while (gone != changed.end() && *gone < body.slot) ++gone;
-      if (gone == changed.end() || *gone != body.slot) now.push_back(body);
+      for (; add != added_[l].end() && add->slot < body.slot; ++add) now.push_back(std::move(*add));
+      while (gone != changed_.end() && *gone < body.slot) ++gone;
+      if (gone == changed_.end() || *gone != body.slot) now.push_back(body);
     }
-    std::move(add, added[l].end(), std::back_inserter(now));
+    std::move(add, added_[l].end(), std::back_inserter(now));
     for (NearBody& body : now) body.wanted = wanted(step, *body.record);
     books_[l].set(step, std::move(now));
   }
+  for (NearBodies& added : added_) added.clear();
 }
 
 void Announcer::tell(Step front) {
@@ -69,6 +69,7 @@ void Announcer::tell(Step front) {
   for (std::size_t l = 0; l < books_.size(); ++l)
     for (Frame& frame : books_[l].tell(front, context_.settings.epoch)) {
       ++context_.stats.frames_sent;
+      context_.stats.frames_corrected += frame.revision.count > 1;
       context_.stats.frame_bodies_sent += frame.set.bodies.size();
       context_.links[l].add(std::move(frame));
     }

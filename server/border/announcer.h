@@ -24,10 +24,13 @@ class Announcer {
 
  private:
   void update(Step step);
-  std::vector<bool> wanted(Step step, const timeline::Record& record) const;
+  std::uint64_t wanted(Step step, const timeline::Record& record) const;
   const Context& context_;
   std::vector<FrameBook> books_;  // by link
   Step oldest_ = 0;
+  // Scratch of update().
+  std::vector<timeline::Slot> changed_;
+  std::vector<NearBodies> added_;  // by link
   std::vector<WorldId> hearers_;
 };
 

@@ -19,10 +19,8 @@ constexpr std::uint32_t kMagic = 0x41444f53;  // "SODA"
 constexpr std::size_t kRecordHead = sizeof(ContactRecord) - kMaxContactPoints * sizeof(ContactPoint);
 
 void put_bytes(std::vector<std::byte>& out, const void* data, std::size_t size) {
-  if (size == 0) return;
-  const std::size_t at = out.size();
-  out.resize(at + size);
-  std::memcpy(out.data() + at, data, size);
+  const auto* const bytes = static_cast<const std::byte*>(data);
+  out.insert(out.end(), bytes, bytes + size);
 }
 
 template <typename T>
@@ -320,6 +318,12 @@ BodySet decode_set(std::span<const std::byte>& bytes, const physics::Model& mode
 
 std::vector<std::byte> encode(const Message& message) {
   std::vector<std::byte> out;
+  encode(message, out);
+  return out;
+}
+
+void encode(const Message& message, std::vector<std::byte>& out) {
+  out.clear();
   const Header& h = message.header;
   put(out, kMagic);
   put(out, kCodecVersion);
@@ -347,7 +351,6 @@ std::vector<std::byte> encode(const Message& message) {
     put(out, part.revision);
   }
   put_territory(out, message);
-  return out;
 }
 
 Header decode_header(std::span<const std::byte> bytes) {

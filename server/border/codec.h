@@ -20,6 +20,7 @@ struct CodecError : std::runtime_error {
 };
 
 std::vector<std::byte> encode(const Message& message);
+void encode(const Message& message, std::vector<std::byte>& out);  // in place of what is there
 
 // Throws CodecError for anything cut short, too long, out of order, not finite, or about bodies that `model` does not
 // have. What it returns can be trusted to be well-formed, not to be true.

@@ -21,16 +21,22 @@ std::shared_ptr<const NearBodies> sleepers(const std::shared_ptr<const NearBodie
 
 BodySet set_of(const NearBodies& bodies) {
   std::vector<const NearBody*> by_id;
-  for (const NearBody& b : bodies) by_id.push_back(&b);
+  by_id.reserve(bodies.size());
+  std::size_t wanted = 0;
+  for (const NearBody& b : bodies) {
+    by_id.push_back(&b);
+    for (std::size_t i = 0; i < b.record->count; ++i) wanted += b.wants(i);
+  }
   std::sort(by_id.begin(), by_id.end(),
             [](const NearBody* l, const NearBody* r) { return l->record->body.id < r->record->body.id; });
   BodySet set;
   set.bodies.reserve(bodies.size());
+  set.contacts.reserve(wanted);
   for (const NearBody* const b : by_id) {
     set.bodies.push_back(b->record->body);
     const auto contacts = b->record->contacts();
     for (std::size_t i = 0; i < contacts.size(); ++i)
-      if (b->wanted.empty() || b->wanted[i]) set.contacts.push_back(contacts[i]);
+      if (b->wants(i)) set.contacts.push_back(contacts[i]);
   }
   return set;
 }

@@ -16,7 +16,9 @@ namespace soda::border {
 struct NearBody {
   timeline::Slot slot = 0;
   Ref<timeline::Record> record;
-  std::vector<bool> wanted;  // contact records, by position; empty: all
+  std::uint64_t wanted = kAll;  // contact records, by position; those that have no bit are wanted, too
+  static constexpr std::uint64_t kAll = ~std::uint64_t{0};
+  bool wants(std::size_t contact) const { return contact >= 64 || (wanted >> contact & 1) != 0; }
 };
 using NearBodies = std::vector<NearBody>;  // ascending by slot
 

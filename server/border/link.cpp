@@ -38,7 +38,8 @@ void Link::send(Step upto, Step final_step, Step near_final, ActionNumber logged
   told_near_final_ = near_final;
   next_.header = header(++sent_, false);
   next_.header.logged = logged;
-  log_.push_back(encode(next_));
+  encode(next_, scratch_);
+  log_.push_back(scratch_);
   out.push_back(log_.back());
   next_.frames.clear();
   next_.parts.clear();

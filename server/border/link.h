@@ -79,6 +79,7 @@ class Link {
   Step told_upto_ = -1, told_final_ = -1, told_near_final_ = -1;
   std::uint64_t sent_ = 0;                  // newest number sent
   std::deque<std::vector<std::byte>> log_;  // messages sent_ - log_.size() + 1 .. sent_
+  std::vector<std::byte> scratch_;
   bool repeat_ = false, ask_ = false;
 
   std::uint64_t received_ = 0;                     // everything up to this number has been delivered

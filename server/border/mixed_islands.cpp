@@ -25,14 +25,19 @@ bool MixedIslands::put(Part part) {
   for (std::uint32_t i = 0; i < part.components.size(); ++i) {
     const Component& component = *part.components[i];
     indexed.hashes.push_back(component_hash(component));
-    for (const BodyState& body : component.set.bodies) indexed.holder.emplace(body.id, i);
+    for (const BodyState& body : component.set.bodies) indexed.holder.emplace_back(body.id, i);
     std::vector<WorldId>& touched = indexed.touched.emplace_back();
     for (const Port& port : component.ports) {
-      indexed.port_users.emplace(port.body, i);
+      indexed.port_users.emplace_back(port.body, i);
       if (std::find(touched.begin(), touched.end(), port.owner) == touched.end()) touched.push_back(port.owner);
     }
-    indexed.touched_by_any.insert(touched.begin(), touched.end());
+    indexed.touched_by_any.insert(indexed.touched_by_any.end(), touched.begin(), touched.end());
   }
+  std::sort(indexed.holder.begin(), indexed.holder.end());
+  std::sort(indexed.port_users.begin(), indexed.port_users.end());
+  std::vector<WorldId>& any = indexed.touched_by_any;
+  std::sort(any.begin(), any.end());
+  any.erase(std::unique(any.begin(), any.end()), any.end());
   indexed.part = std::move(part);
   parts_.insert_or_assign(origin, std::move(indexed));
   return true;
@@ -74,8 +79,8 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
     for (const Port& port : component.ports) {
       const Indexed* part = part_of(port.owner);
       if (!part) continue;
-      const auto holder = part->holder.find(port.body);
-      if (holder == part->holder.end()) {
+      const auto holder = std::lower_bound(part->holder.begin(), part->holder.end(), std::pair(port.body, 0u));
+      if (holder == part->holder.end() || holder->first != port.body) {
         misfit(port.owner, "world " + std::to_string(key.origin) + " touches body " + std::to_string(port.body) +
                                ", but its owner " + std::to_string(port.owner) + " does not say so");
         continue;
@@ -95,8 +100,10 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
       neighbourhood_->reached(body, step_, reached);
       for (const WorldId world : reached)
         if (const Indexed* part = part_of(world)) {
-          const auto [first, last] = part->port_users.equal_range(body.id);
-          for (auto it = first; it != last; ++it) visit({world, it->second});
+          const auto& users = part->port_users;
+          for (auto it = std::lower_bound(users.begin(), users.end(), std::pair(body.id, 0u));
+               it != users.end() && it->first == body.id; ++it)
+            visit({world, it->second});
         }
     }
   }
@@ -108,7 +115,8 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
 
 bool MixedIslands::touches(WorldId world, WorldId other) const {
   const auto it = parts_.find(world);
-  return it != parts_.end() && it->second.touched_by_any.contains(other);
+  return it != parts_.end() &&
+         std::binary_search(it->second.touched_by_any.begin(), it->second.touched_by_any.end(), other);
 }
 
 bool MixedIslands::touches_both(const Closure& island, WorldId world, WorldId one, WorldId other) const {

@@ -11,7 +11,7 @@
 #include <optional>
 #include <set>
 #include <stdexcept>
-#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "server/border/message.h"
@@ -64,11 +64,12 @@ class MixedIslands {
  private:
   struct Indexed {
     Part part;
-    std::vector<std::uint64_t> hashes;                          // by component
-    std::unordered_map<BodyId, std::uint32_t> holder;           // body -> component
-    std::unordered_multimap<BodyId, std::uint32_t> port_users;  // port -> components
-    std::vector<std::vector<WorldId>> touched;                  // by component: whose bodies are its ports
-    std::set<WorldId> touched_by_any;
+    using InComponent = std::pair<BodyId, std::uint32_t>;
+    std::vector<std::uint64_t> hashes;          // by component
+    std::vector<InComponent> holder;            // which component has a body; ascending
+    std::vector<InComponent> port_users;        // which components have a body as a port; ascending
+    std::vector<std::vector<WorldId>> touched;  // by component: whose bodies are its ports
+    std::vector<WorldId> touched_by_any;        // ascending
   };
   const Neighbourhood* neighbourhood_;
   Step step_;

@@ -1,6 +1,8 @@
 #include "server/border/neighbourhood.h"
 
 #include <algorithm>
+#include <span>
+#include <utility>
 
 #include "common/grid.h"
 #include "server/physics/stepper.h"
@@ -81,10 +83,13 @@ void Neighbourhood::reached_by_box(const BodyState& body, Step step, std::vector
   const Aabb box = physics::reach_box(body, model_);
   const Vec3 half = Vec3::Constant(0.5 * grid.edge);
   const Cell low = grid.cell_of(box.min - half), high = grid.cell_of(box.max + half);
+  const std::span<const WorldId> owners = territories_.owners(step);
+  WorldId last = kNoWorld;
   for (std::int32_t z = low[2]; z <= high[2]; ++z)
     for (std::int32_t y = low[1]; y <= high[1]; ++y)
       for (std::int32_t x = low[0]; x <= high[0]; ++x) {
-        const WorldId w = territories_.owner(grid.index({x, y, z}), step);
+        const WorldId w = owners[grid.index({x, y, z})];
+        if (std::exchange(last, w) == w) continue;
         if (std::find(worlds.begin(), worlds.end(), w) == worlds.end()) worlds.push_back(w);
       }
 }

@@ -92,7 +92,7 @@ void Settler::find_threats(Step step) {
     for (const KeptIsland& island : at(seen).kept) {
       if (island.state != State::kOpen) continue;
       for (std::size_t i = 0; i < island.boxes.size(); ++i)
-        if (threatening_.add(island.island->own[i]))
+        if (threatening_.add(island.island->members[i]))
           threats_.add(island.boxes[i], island.component->set.bodies[i].v(), static_cast<double>(step - seen) * dt,
                        margin);
     }
@@ -385,9 +385,9 @@ std::string Settler::why_not_final(Step step) const {
                                               ? exchange.parts.close({context_.settings.me, island.index})
                                               : MixedIslands::Closure{};
     text += "island of";
-    for (const timeline::Slot slot : island.island->own) text += " " + std::to_string(context_.timeline.id_of(slot));
+    for (const timeline::Slot slot : island.island->own()) text += " " + std::to_string(context_.timeline.id_of(slot));
     text += " with";
-    for (const timeline::Slot slot : island.island->foreign)
+    for (const timeline::Slot slot : island.island->foreign())
       text += " " + std::to_string(context_.timeline.id_of(slot));
     text += island.state == State::kSolved ? ": solved" : island.state == State::kOpen ? ": open" : ": unconfirmed";
     for (const WorldId world : closure.missing) text += ", lacks " + std::to_string(world);

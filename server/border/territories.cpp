@@ -40,13 +40,6 @@ Territories::Territories(const TerritoryMap& initial, std::span<const Transfer> 
   for (const Transfer& transfer : transfers) add(transfer);
 }
 
-const Territories::Version& Territories::at(Step step) const {
-  auto version = versions_.end();
-  do --version;
-  while (version->from > step && version != versions_.begin());
-  return *version;
-}
-
 std::string Territories::fault(const Transfer& t) const {
   if (t.giver >= worlds_ || t.taker >= worlds_ || t.giver == t.taker) return "such worlds cannot be";
   if (t.number <= known_[t.giver]) return {};

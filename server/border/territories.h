@@ -38,6 +38,7 @@ class Territories {
   const std::vector<Transfer>& transfers() const { return transfers_; }  // that are remembered: by step, giver, number
 
   WorldId owner(std::size_t cell, Step step) const { return at(step).owner[cell]; }
+  std::span<const WorldId> owners(Step step) const { return at(step).owner; }  // by cell
   WorldId owner_of(const Vec3& position, Step step) const { return owner(grid_.index(grid_.cell_of(position)), step); }
   // The one world that owns every cell within one cell, or kNoWorld.
   WorldId sole(std::size_t cell, Step step) const { return at(step).sole[cell]; }
@@ -69,7 +70,12 @@ class Territories {
     std::vector<WorldId> owner, sole;        // by cell
     std::vector<std::uint8_t> near_changed;  // by cell; of the first: empty
   };
-  const Version& at(Step step) const;
+  const Version& at(Step step) const {
+    auto version = versions_.end();
+    do --version;
+    while (version->from > step && version != versions_.begin());
+    return *version;
+  }
   void make_sole(Version& version, const std::vector<std::uint8_t>& where) const;
   void rebuild_from(Step step);
 

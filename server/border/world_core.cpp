@@ -33,7 +33,8 @@ class WorldCore::Impl final : timeline::Arbiter {
         announcer_(context_),
         settler_(context_),
         trade_(context_, territories_),
-        timeline_(model, settings.me, links_.size(), *this) {
+        timeline_(model, settings.me, links_.size(), *this,
+                  settings.sync == Sync::kConservative ? timeline::Timeline::kWhole : settings.piece_bodies) {
     for (const Link& link : links_) neighbours_.push_back(link.peer());
     timeline_.stepper().timing = settings.measure;
     final_ = 0;  // the scene
@@ -144,8 +145,9 @@ class WorldCore::Impl final : timeline::Arbiter {
   // The earliest step first, newer ones while nothing can be done there.
   bool advance(bool patient) {
     holding_ = false;
-    if (timeline_.unfinished() >= 0) {
-      timeline_.finish();
+    if (const Step step = timeline_.unfinished(); step >= 0) {
+      // Others wait for what is told of mixed islands, and for nothing that is left of the round after its first piece.
+      if (timeline_.unfinished_outside() >= 0 || !try_settle(step)) timeline_.finish();
       return true;
     }
     Step end = std::min({settings_.last_step, limit_, final_ + settings_.window});
@@ -163,11 +165,16 @@ class WorldCore::Impl final : timeline::Arbiter {
         settler_.retry_all();  // who waited for islands that were found anew may not need to any more
         return true;
       }
-      if (step < timeline_.newest() && !timeline_.has_pending(step) &&
-          settler_.try_settle(step, [&](const BodySet& set) { settle(step, set); }))
-        return true;
+      if (step < timeline_.newest() && try_settle(step)) return true;
     }
     return false;
+  }
+
+  bool try_settle(Step step) {
+    return !timeline_.has_pending(step) && settler_.try_settle(step, [&](const BodySet& results) {
+      timeline_.settle(step, results);
+      settler_.retry_all();  // who waited for these bodies need not any more
+    });
   }
 
   // With the window nearly full, the next step is not needed for long, and what others say, which makes steps final,
@@ -190,11 +197,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     idle_ = false;
     untold_ = true;
     front_.reset();
-  }
-
-  void settle(Step step, const BodySet& results) {
-    timeline_.settle(step, results);
-    settler_.retry_all();  // who waited for these bodies need not any more
+    told_front_.reset();
   }
 
   // ---- what goes out
@@ -206,7 +209,8 @@ class WorldCore::Impl final : timeline::Arbiter {
       learn(*transfer, nullptr);
     }
     if (!links_.empty() && std::exchange(untold_, false)) {
-      const Step now = front();
+      const Step now = told_front();
+      if (now > front() && std::exchange(told_early_, now) != now) ++stats_.told_early;
       announcer_.tell(now);
       for (Step step = timeline_.oldest(); step <= std::min(now, settings_.last_step - 1); ++step) {
         if (step == timeline_.newest() || timeline_.has_pending(step) || !context_.all_have_reached(step)) break;
@@ -220,7 +224,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     std::vector<Outgoing> out;
     std::vector<std::vector<std::byte>> messages;
     for (Link& link : links_) {
-      if (!link.may_send(front())) continue;
+      if (!link.may_send(told_front())) continue;
       messages.clear();
       const std::uint64_t resent = link.resent();
       link.collect(messages);
@@ -230,8 +234,8 @@ class WorldCore::Impl final : timeline::Arbiter {
       constexpr Step kFarAhead = 4;
       const bool final_news = (waiting || timeline_.newest() > final_ + kFarAhead) &&
                               (link.told_final() != final_ || link.told_near_final() != near_final_);
-      if (link.has_content() || link.told_upto() != front() || final_news)
-        link.send(front(), final_, near_final_, logged_, messages);
+      if (link.has_content() || link.told_upto() != told_front() || final_news)
+        link.send(told_front(), final_, near_final_, logged_, messages);
       for (auto& bytes : messages) {
         ++stats_.messages_sent;
         stats_.bytes_sent += bytes.size();
@@ -244,14 +248,21 @@ class WorldCore::Impl final : timeline::Arbiter {
 
   // ---- what is known
   Step front() const {
-    if (!front_) {
-      Step step = final_;
-      while (step < timeline_.newest() && !timeline_.has_pending(step) && step != timeline_.unfinished() &&
-             !settler_.has_open(step))
-        ++step;
-      front_ = step;
-    }
+    if (!front_) front_ = front_before(timeline_.unfinished());
     return *front_;
+  }
+
+  // The same for what others hear of.
+  Step told_front() const {
+    if (!told_front_) told_front_ = front_before(timeline_.unfinished_outside());
+    return *told_front_;
+  }
+
+  Step front_before(Step unfinished) const {
+    Step step = final_;
+    while (step < timeline_.newest() && !timeline_.has_pending(step) && step != unfinished && !settler_.has_open(step))
+      ++step;
+    return step;
   }
 
   std::vector<WorldId> waiting_for() const {
@@ -431,10 +442,11 @@ class WorldCore::Impl final : timeline::Arbiter {
   Closings closings_;
   HeldBack held_back_;
   bool begun_ = false;
-  bool idle_ = false;                  // nothing can be done before something comes
-  bool holding_ = false;               // a step could be begun, with some patience better than now
-  bool untold_ = true;                 // something has changed since it was last looked at what to tell
-  mutable std::optional<Step> front_;  // as long as nothing changes
+  bool idle_ = false;     // nothing can be done before something comes
+  bool holding_ = false;  // a step could be begun, with some patience better than now
+  Step told_early_ = -1;
+  bool untold_ = true;                              // something has changed since it was last looked at what to tell
+  mutable std::optional<Step> front_, told_front_;  // as long as nothing changes
   Neighbourhood neighbourhood_;
   std::deque<Link> links_;
   std::vector<WorldId> neighbours_;  // by link

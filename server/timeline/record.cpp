@@ -1,55 +1,32 @@
 #include "server/timeline/record.h"
 
 #include <array>
-#include <cstdlib>
 #include <cstring>
-#include <iterator>
 #include <new>
-#include <vector>
 
-#include "common/prefetch.h"
+#include "common/recycled.h"
 #include "common/state_hash.h"
 
 namespace soda::timeline {
 namespace {
 
-// Blocks by number of contact records. Each block is memory of its own, so it may end up with another thread.
+// By number of contact records.
 class Pool {
  public:
-  ~Pool() {
-    for (auto& blocks : free_)
-      for (void* block : blocks) std::free(block);
-  }
-  // The block was given back when it fell out of the window, so no cache holds it; nor those that will be taken next.
   void* take(std::uint32_t contacts) {
     const std::size_t bytes = sizeof(Record) + contacts * sizeof(ContactRecord);
-    if (contacts < kSizes && !free_[contacts].empty()) {
-      std::vector<void*>& blocks = free_[contacts];
-      void* block = blocks.back();
-      blocks.pop_back();
-      if (std::ssize(blocks) >= kAhead) prefetch(blocks.end()[-kAhead], bytes);
-      return block;
-    }
-    void* block = std::malloc(bytes);
-    if (!block) throw std::bad_alloc();
-    return block;
+    return contacts < kSizes ? free_[contacts].take(bytes) : ::operator new(bytes);
   }
   void give_back(void* block, std::uint32_t contacts) {
-    if (kPooled && contacts < kSizes)
-      free_[contacts].push_back(block);
+    if (contacts < kSizes)
+      free_[contacts].give_back(block);
     else
-      std::free(block);
+      ::operator delete(block);
   }
 
  private:
   static constexpr std::uint32_t kSizes = 32;
-  static constexpr std::ptrdiff_t kAhead = 2;
-#ifdef __SANITIZE_ADDRESS__
-  static constexpr bool kPooled = false;  // so that it sees what is used too late
-#else
-  static constexpr bool kPooled = true;
-#endif
-  std::array<std::vector<void*>, kSizes> free_;
+  std::array<FreeBlocks, kSizes> free_;
 };
 
 thread_local Pool pool;

@@ -12,7 +12,8 @@
 
 namespace soda::timeline {
 
-// Where a body is, as those see it who divide space among worlds: a function of its state, the step and the world asked.
+// Where a body is, as those see it who divide space among worlds: a function of its state, the step and the world
+// asked.
 struct Place {
   WorldId owner = 0;
   bool wide = false;    // its reach box reaches more than half a cell from its centre along an axis, and this world

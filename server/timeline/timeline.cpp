@@ -35,11 +35,13 @@ bool same(const NearSet& l, const NearSet& r) {
       [](const NearSet::Body& a, const NearSet::Body& b) { return a.slot == b.slot && same(*a.record, *b.record); });
 }
 
-Timeline::Timeline(const physics::Model& model, WorldId me, std::size_t sources, Arbiter& arbiter)
+Timeline::Timeline(const physics::Model& model, WorldId me, std::size_t sources, Arbiter& arbiter,
+                   std::size_t piece_bodies)
     : model_(model),
       slots_(model),
       me_(me),
       arbiter_(arbiter),
+      piece_bodies_(piece_bodies),
       stepper_(model),
       index_(index_cell(model)),
       told_(sources),
@@ -86,10 +88,10 @@ BodySet Timeline::all_produced(Step step) const {
   return set;
 }
 
-std::vector<Slot> Timeline::take_changed(Step step) {
-  std::vector<Slot> changed = std::exchange(at(step).changed, {});
+void Timeline::take_changed(Step step, std::vector<Slot>& changed) {
+  changed.swap(at(step).changed);
+  at(step).changed.clear();
   sort_unique(changed);
-  return changed;
 }
 
 void Timeline::release_before(Step step) {
@@ -361,7 +363,9 @@ void Timeline::store(Step step, std::vector<Table<Record>::Item>& items) {
   Entry& entry = at(step);
   std::uint64_t redone = 0;
   for (const auto& [slot, record] : items) {
-    if (const Record* const old = entry.produced.get(slot)) {
+    const Record* const old = entry.produced.get(slot);
+    if (!old || !inside(*old) || !inside(*record)) entry.changed.push_back(slot);
+    if (old) {
       entry.hash -= old->hash;
       // That of a sleeping body was carried there from an earlier step.
       redone += old->computed == step || (step < newest() && old->body.asleep());
@@ -371,7 +375,6 @@ void Timeline::store(Step step, std::vector<Table<Record>::Item>& items) {
     entry.hash += record->hash;
     set_departed(entry, slot, !own(*record));
     entry.pending.push_back(slot);
-    entry.changed.push_back(slot);
     stored_.emplace_back(slot, record.get());
   }
   entry.produced.assign(items);

@@ -13,12 +13,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "common/body_set.h"
+#include "common/recycled.h"
 #include "common/table.h"
 #include "server/physics/stepper.h"
 #include "server/timeline/effects.h"
@@ -30,9 +32,12 @@
 namespace soda::timeline {
 
 // Bodies that must be solved together at a step, as far as this world sees.
-struct Island {
+struct Island : Recycled<Island> {
   std::uint32_t references = 0;
-  std::vector<Slot> own, foreign;  // ascending by id
+  std::uint32_t owned = 0;
+  std::vector<Slot> members;  // own ones, then foreign ones; each ascending by id
+  std::span<const Slot> own() const { return std::span(members).first(owned); }
+  std::span<const Slot> foreign() const { return std::span(members).subspan(owned); }
   friend void release(Island* island) { delete island; }
 };
 
@@ -92,8 +97,14 @@ struct TimelineStats {
 
 class Timeline {
  public:
+  // As piece_bodies: a round is done at once.
+  static constexpr std::size_t kWhole = std::numeric_limits<std::size_t>::max();
+
   // `model` and `arbiter` must outlive it. Entry 0 holds the scene's bodies that lie in `me`'s territory, all pending.
-  Timeline(const physics::Model& model, WorldId me, std::size_t sources, Arbiter& arbiter);
+  // `piece_bodies`: of islands of which nobody hears (see finish) so many bodies are done at a time, or more where that
+  // would make very many pieces.
+  Timeline(const physics::Model& model, WorldId me, std::size_t sources, Arbiter& arbiter,
+           std::size_t piece_bodies = kWhole);
 
   Step oldest() const { return base_; }
   Step newest() const { return base_ + static_cast<Step>(entries_.size()) - 1; }
@@ -111,12 +122,16 @@ class Timeline {
 
   bool has_pending(Step step) const { return !at(step).pending.empty(); }
   std::span<const Slot> pending(Step step) const { return at(step).pending; }
-  // Does step -> step + 1 for what is pending and what that affects, in two parts: `process` finds the islands and
-  // hands those that must wait to the arbiter; `finish` solves the others. In between, the arbiter's news may be sent,
-  // and more may be heard. Makes the entry `step + 1` if it is not there.
+  // Does step -> step + 1 for what is pending and what that affects, in parts: `process` finds the islands and hands
+  // those that must wait to the arbiter; each call of `finish` solves some of the others, until unfinished() is -1.
+  // First those of which others may hear: bodies that are inside (Place) at `step` are hardly heard of at the next (if
+  // one is, that is news of step + 1 like any other). In between, the arbiter's news may be sent, islands settled, and
+  // more may be heard. Makes the entry `step + 1` if it is not there.
   void process(Step step);
   void finish();
   Step unfinished() const { return unfinished_; }  // the step of a round that waits for finish(), else -1
+  // The same as long as that round has islands of which others may hear.
+  Step unfinished_outside() const { return outside_left_ ? unfinished_ : -1; }
   // Results of own bodies of islands that the arbiter kept.
   void settle(Step step, const BodySet& results);
   // Does all of an entry's step again, for tests: what it finds must be what is there.
@@ -135,7 +150,7 @@ class Timeline {
   // Whether it was found at `step` to touch bodies of others, directly or through its own.
   bool touches_foreign(Step step, Slot slot) const {
     const Island* const island = at(step).islands.get(slot);
-    return island && !island->foreign.empty();
+    return island && !island->foreign().empty();
   }
   // f(record) for every body that this world produced at `step` and that is another's there.
   template <typename F>
@@ -152,8 +167,10 @@ class Timeline {
       for (const NearSet::Body& b : heard->bodies)
         if (b.record->place.wide && !own(*b.record)) f(b.slot, *b.record);
   }
-  // Bodies whose produced record at `step` changed since the last call.
-  std::vector<Slot> take_changed(Step step);
+  // Bodies whose produced record at `step` changed since the last call, ascending; without those that nobody else had
+  // to do with before, and has now (inside).
+  void take_changed(Step step, std::vector<Slot>& changed);
+  bool inside(const Record& record) const { return record.place.inside && own(record); }
 
   // For tests: the index finds every record of every entry.
   bool is_indexed() const;
@@ -197,12 +214,14 @@ class Timeline {
   void take_away(Step step, Slot slot);
   void drop(Step step, Slot slot);
   void add_around(Step step, Slot slot);
+  void add_around(Slot slot, const Record& record);
   void gather(Step step, std::size_t first_affected);
   void gather_all(Step step);
-  void find(Step step);
+  void find();
   bool concerned(std::uint32_t island) const;
   bool grown(Step step);
   void sort_out(Step step, bool all);
+  void divide();
   void keep(Step step, std::uint32_t island, Ref<Island> members);
   void do_actions(Step step, BodyId id);
   Ref<Record> after_actions(Step step, BodyId id, const Record* raw) const;
@@ -214,6 +233,7 @@ class Timeline {
   Slots slots_;
   const WorldId me_;
   Arbiter& arbiter_;
+  const std::size_t piece_bodies_;
   physics::Stepper stepper_;
   SpatialIndex index_;
   Marks ever_heard_;             // bodies that others have told of
@@ -226,9 +246,10 @@ class Timeline {
 
   // The round at hand.
   Step unfinished_ = -1;
-  std::vector<Slot> changed_;   // bodies whose record at the step is another than before, ascending
-  std::vector<Slot> affected_;  // own bodies to do
-  std::vector<Slot> around_;    // those, and all that may touch them, ascending by id
+  std::vector<Slot> changed_;                  // bodies whose record at the step is another than before
+  std::vector<Slot> affected_;                 // own bodies to do
+  std::vector<Slot> around_;                   // those, and all that may touch them, ascending by id
+  std::vector<const Record*> around_records_;  // by slot, of those
   std::vector<Slot> candidates_;
   Marks in_changed_, in_affected_, in_around_, in_old_islands_;
   std::vector<Ref<Island>> old_islands_;
@@ -240,8 +261,13 @@ class Timeline {
   std::size_t own_contacts_ = 0;
   std::vector<physics::Ends> ends_;
   physics::Islands islands_;
-  std::vector<std::uint32_t> solved_;     // islands
-  std::vector<std::uint8_t> has_result_;  // by position in bodies_
+  std::vector<std::uint32_t> solved_;    // islands, by piece
+  std::vector<std::size_t> piece_ends_;  // in solved_
+  std::size_t pieces_done_ = 0;
+  bool outside_left_ = false;                  // the next piece has bodies of which others may hear
+  std::vector<std::uint32_t> inner_;           // islands of which nobody hears
+  std::vector<std::uint8_t> piece_of_;         // by position in bodies_: which piece has its result, from 1; 0: none
+  std::vector<std::uint32_t> contacts_begin_;  // by position in bodies_, in contacts_
   std::vector<Aabb> boxes_;
   std::vector<Table<Record>::Item> results_;
   std::vector<BodyId> acting_;  // bodies that something is done to at the step of the results, ascending

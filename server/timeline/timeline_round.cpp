@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/physics/solver_kernel.h"
 #include "server/timeline/timeline.h"
 
 namespace soda::timeline {
@@ -9,6 +10,8 @@ namespace {
 
 // Where so large a share of an entry is to be done, looking at all of it is cheaper than looking around each body.
 constexpr std::size_t kAllShare = 2;
+
+constexpr std::size_t kMostPieces = 8;
 
 }  // namespace
 
@@ -29,9 +32,9 @@ void Timeline::affect(Step step, Slot slot) {
 // The island that was found at the step with this body does not stand any more: all of it must be done.
 void Timeline::affect_island(Step step, Slot slot) {
   Island* const island = at(step).islands.get(slot);
-  if (!island || !in_old_islands_.add(island->own.empty() ? island->foreign.front() : island->own.front())) return;
+  if (!island || !in_old_islands_.add(island->members.front())) return;
   old_islands_.emplace_back(island);
-  for (const Slot member : island->own) affect(step, member);
+  for (const Slot member : island->own()) affect(step, member);
 }
 
 void Timeline::affect_touched(Step step, const Record& foreign) {
@@ -46,9 +49,15 @@ void Timeline::affect_touched(Step step, const Record& foreign) {
 }
 
 void Timeline::add_around(Step step, Slot slot) {
-  if (in_around_.has(slot) || !known(step, slot)) return;
+  if (in_around_.has(slot)) return;
+  if (const Record* const record = known(step, slot)) add_around(slot, *record);
+}
+
+void Timeline::add_around(Slot slot, const Record& record) {
   in_around_.add(slot);
   around_.push_back(slot);
+  if (slot >= around_records_.size()) around_records_.resize(slot + slot / 2 + 64);
+  around_records_[slot] = &record;
 }
 
 void Timeline::gather(Step step, std::size_t first_affected) {
@@ -63,8 +72,8 @@ void Timeline::gather(Step step, std::size_t first_affected) {
 void Timeline::gather_all(Step step) {
   const Entry& entry = at(step);
   const auto add = [&](Slot slot, const Record& record) {
-    if (!in_around_.add(slot)) return;
-    around_.push_back(slot);
+    if (in_around_.has(slot)) return;
+    add_around(slot, record);
     if (own(record) && in_affected_.add(slot)) affected_.push_back(slot);
   };
   entry.produced.for_each([&](Slot slot, const Ref<Record>& record) { add(slot, *record); });
@@ -72,15 +81,18 @@ void Timeline::gather_all(Step step) {
     for (const NearSet::Body& b : heard->bodies) add(b.slot, *b.record);
 }
 
-void Timeline::find(Step step) {
+void Timeline::find() {
   const auto by_id = [&](Slot l, Slot r) { return slots_.by_id(l, r); };
-  if (!std::is_sorted(around_.begin(), around_.end(), by_id)) std::sort(around_.begin(), around_.end(), by_id);
+  // Mostly those that are produced here come in order, and the others behind them.
+  const auto end = std::is_sorted_until(around_.begin(), around_.end(), by_id);
+  std::sort(end, around_.end(), by_id);
+  std::inplace_merge(around_.begin(), end, around_.end(), by_id);
   bodies_.clear();
   records_.clear();
   previous_.clear();
   roles_.clear();
   for (const Slot slot : around_) {
-    const Record* const record = known(step, slot);
+    const Record* const record = around_records_[slot];
     records_.push_back(record);
     bodies_.push_back(record->body);
     previous_.push_back(record->contacts());
@@ -121,10 +133,11 @@ bool Timeline::grown(Step step) {
 }
 
 void Timeline::process(Step step) {
-  changed_ = std::exchange(at(step).pending, {});
-  sort_unique(changed_);
+  changed_.clear();
   in_changed_.clear();
-  for (const Slot slot : changed_) in_changed_.add(slot);
+  for (const Slot slot : at(step).pending)
+    if (in_changed_.add(slot)) changed_.push_back(slot);
+  at(step).pending.clear();
   in_affected_.clear();
   in_around_.clear();
   in_old_islands_.clear();
@@ -153,9 +166,9 @@ void Timeline::process(Step step) {
     // Two worlds' wide bodies may touch where neither knows of the other.
     for_each_foreign_wide(step, [&](Slot slot, const Record&) { add_around(step, slot); });
   }
-  find(step);
+  find();
   if (!all)
-    while (grown(step)) find(step);
+    while (grown(step)) find();
   sort_out(step, all);
   if (step == newest()) extend();  // with the islands found now
   for (const Slot slot : changed_) {
@@ -176,21 +189,22 @@ void Timeline::sort_out(Step step, bool all) {
   } else {
     for (const Ref<Island>& old : old_islands_) {
       arbiter_.dropped(step, *old);
-      for (const Slot slot : old->own) entry.islands.set(slot, {});
-      for (const Slot slot : old->foreign) entry.islands.set(slot, {});
+      for (const Slot slot : old->members) entry.islands.set(slot, {});
     }
   }
   solved_.clear();
-  has_result_.assign(bodies_.size(), 0);
+  inner_.clear();
+  const bool all_outside = piece_bodies_ == kWhole || told_.empty() || arbiter_.places_change(step + 1);
   for (std::uint32_t k = 0; k < islands_.size(); ++k) {
     const auto members = islands_.bodies_of(k);
     if (!concerned(k)) continue;
-    bool foreign = false, wide = false;
+    bool foreign = false, wide = false, inside = true;
     for (const std::uint32_t i : members) {
       if (!own(*records_[i]))
         foreign = true;
       else if (records_[i]->place.wide && !records_[i]->place.inside)
         wide = true;
+      inside = inside && records_[i]->place.inside;
     }
     bool wait = foreign || wide;
     if (!wait && may_wait) {
@@ -199,16 +213,60 @@ void Timeline::sort_out(Step step, bool all) {
       wait = arbiter_.must_wait(step, boxes_);
     }
     if (!wait) {
-      solved_.push_back(k);
-      for (const std::uint32_t i : members) has_result_[i] = 1;
+      (inside && !all_outside ? inner_ : solved_).push_back(k);
       if (members.size() == 1) continue;  // alone: nothing to remember
     }
     Ref<Island> island(new Island);
-    for (const std::uint32_t i : members) (own(*records_[i]) ? island->own : island->foreign).push_back(around_[i]);
+    island->members.reserve(members.size());
+    for (const bool owned : {true, false})
+      for (const std::uint32_t i : members)
+        if (own(*records_[i]) == owned) {
+          island->members.push_back(around_[i]);
+          island->owned += owned;
+        }
     for (const std::uint32_t i : members) island_items_.emplace_back(around_[i], island);
     if (wait) keep(step, k, std::move(island));
   }
   entry.islands.assign(island_items_);
+  divide();
+}
+
+// What is to be solved into pieces: the first of islands of which others may hear, and of what is left if it is little.
+void Timeline::divide() {
+  std::size_t bodies = 0;
+  for (const std::uint32_t k : inner_) bodies += islands_.bodies_of(k).size();
+  const std::size_t most = std::max(piece_bodies_, bodies / (kMostPieces - 1) + 1);
+  outside_left_ = true;
+  piece_ends_.clear();
+  if (bodies >= most) piece_ends_.push_back(solved_.size());
+  // Large islands together, by as many as the solver does at once.
+  const auto size = [&](std::uint32_t k) { return islands_.contacts_of(k).size(); };
+  std::sort(inner_.begin(), inner_.end(),
+            [&](std::uint32_t l, std::uint32_t r) { return size(l) != size(r) ? size(l) > size(r) : l < r; });
+  std::size_t in_piece = 0;
+  for (std::size_t i = 0; i < inner_.size(); ++i) {
+    solved_.push_back(inner_[i]);
+    in_piece += islands_.bodies_of(inner_[i]).size();
+    const bool lanes_full = (i + 1) % physics::kLanes == 0 || size(inner_[i]) <= 1;
+    if (bodies < most || in_piece < most || !lanes_full) continue;
+    piece_ends_.push_back(solved_.size());
+    in_piece = 0;
+  }
+  if (piece_ends_.empty() || piece_ends_.back() != solved_.size()) piece_ends_.push_back(solved_.size());
+  pieces_done_ = 0;
+
+  piece_of_.assign(bodies_.size(), 0);
+  std::size_t first = 0;
+  for (std::size_t p = 0; p < piece_ends_.size(); ++p)
+    for (; first < piece_ends_[p]; ++first)
+      for (const std::uint32_t i : islands_.bodies_of(solved_[first])) piece_of_[i] = static_cast<std::uint8_t>(p + 1);
+  contacts_begin_.clear();
+  std::span<const ContactRecord> rest(contacts_.data(), own_contacts_);
+  for (const BodyState& body : bodies_) {
+    contacts_begin_.push_back(static_cast<std::uint32_t>(own_contacts_ - rest.size()));
+    (void)take_contacts(rest, body.id);
+  }
+  contacts_begin_.push_back(static_cast<std::uint32_t>(own_contacts_));
 }
 
 void Timeline::keep(Step step, std::uint32_t island, Ref<Island> members) {
@@ -229,16 +287,18 @@ void Timeline::keep(Step step, std::uint32_t island, Ref<Island> members) {
 }
 
 void Timeline::finish() {
-  const Step step = std::exchange(unfinished_, -1);
-  stepper_.solve(bodies_, contacts_, ends_, islands_, solved_);
+  const std::size_t first = pieces_done_ == 0 ? 0 : piece_ends_[pieces_done_ - 1], end = piece_ends_[pieces_done_];
+  stepper_.solve(bodies_, contacts_, ends_, islands_, std::span(solved_).subspan(first, end - first));
+  const Step step = unfinished_;
+  ++pieces_done_;
+  outside_left_ = false;
+  if (pieces_done_ == piece_ends_.size()) unfinished_ = -1;
   results_.clear();
   acting_ = effects_.acted_on(step + 1);
-  std::span<const ContactRecord> rest(contacts_.data(), own_contacts_);
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const auto contacts = take_contacts(rest, bodies_[i].id);
-    if (!has_result_[i]) continue;
-    take_result(step + 1, around_[i], bodies_[i], contacts);
-  }
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    if (piece_of_[i] == pieces_done_)
+      take_result(step + 1, around_[i], bodies_[i],
+                  std::span(contacts_).subspan(contacts_begin_[i], contacts_begin_[i + 1] - contacts_begin_[i]));
   store(step + 1, results_);
 }
 

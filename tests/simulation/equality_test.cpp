@@ -197,6 +197,49 @@ TEST(Given, AlongRowsOfWorlds) {
   EXPECT_GT(transfers, 20u);
 }
 
+// A step is told when all that others hear of is done. What nobody could hear of may come so far in one step that
+// somebody does: then that is corrected.
+TEST(Pieces, WhatIsToldTooEarlyIsCorrected) {
+  SceneBuilder builder("bullets");
+  builder.scene.gravity = Vec3::Zero();
+  builder.scene.max_speed = 120;  // cells of 2 m
+  for (int i = 0; i < 24; ++i) {
+    builder.add(Sphere{0.1}, Vec3(-40 + 1.7 * i, i % 6, 0)).linear_velocity = Vec3(50, 0, 0);
+    builder.add(Box{Vec3(0.2, 0.2, 0.2)}, Vec3(3 + i % 4, i % 6, 0));
+    builder.add(Box{Vec3(0.2, 0.2, 0.2)}, Vec3(-38 + i, 8, 0)).linear_velocity = Vec3(0, 0.1, 0);
+  }
+  const Scene scene = builder.finish();
+  constexpr Step kSteps = 60;
+  const std::vector<StepDigest> expected = run_single(scene, kSteps);
+  const std::vector<WorldId> owner = slabs(scene, 2);
+  ASSERT_FALSE(owner.empty());
+  const auto run = [&](border::Sync sync, std::uint64_t seed, std::size_t piece_bodies) {
+    NetworkSettings network;
+    network.sync = sync;
+    network.seed = seed;
+    network.delay = 1;
+    network.piece_bodies = piece_bodies;
+    const SessionResult got = run_session(scene, 2, kSteps, network, owner);
+    EXPECT_EQ(got.failure, "");
+    EXPECT_EQ(first_difference(expected, got.steps), "") << "seed " << seed << ", pieces of " << piece_bodies;
+    EXPECT_GT(got.total.arrived, 10u);
+    return got.total;
+  };
+  std::uint64_t corrected = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const border::CoreStats pieces = run(border::Sync::kAnticipative, seed, 4);
+    EXPECT_GT(pieces.told_early, 20u);
+    corrected += pieces.frames_corrected;
+    const border::CoreStats whole = run(border::Sync::kAnticipative, seed, 1000);
+    EXPECT_EQ(whole.told_early, 0u);
+    EXPECT_EQ(whole.frames_corrected, 0u);
+    const border::CoreStats conservative = run(border::Sync::kConservative, seed, 4);
+    EXPECT_EQ(conservative.told_early, 0u) << "nothing is assumed in this mode";
+    EXPECT_EQ(conservative.frames_corrected, 0u);
+  }
+  EXPECT_GT(corrected, 8u);
+}
+
 TEST(WideBodies, AreToldToEveryWorldTheyReach) {
   const Reference& expected = reference("wide_bodies");
   const SessionResult got = run_session(expected.scene, 8, 150, {});

@@ -283,7 +283,7 @@ TEST(FrameBook, TellsWhatTheOtherSideWouldNotAssume) {
     BodyState b;
     b.id = id;
     if (asleep) b.flags |= kAsleep;
-    return border::NearBody{static_cast<timeline::Slot>(id), timeline::make_record(b, {}, {}, 0), {}};
+    return border::NearBody{static_cast<timeline::Slot>(id), timeline::make_record(b, {}, {}, 0)};
   };
   const auto ids = [](const BodySet& set) {
     std::vector<BodyId> all;

@@ -36,6 +36,7 @@ NetworkSettings network_of(std::uint64_t seed) {
   n.window = std::vector<Step>{48, 12, 3}[random() % 3];
   n.lead = std::vector<Step>{1, 4, 20, 200}[random() % 4];
   n.touch_share = std::vector<double>{0, 0.004}[random() % 2];
+  n.piece_bodies = std::vector<std::size_t>{1, 20}[random() % 2];  // few: so are the bodies
   return n;
 }
 
@@ -127,11 +128,11 @@ std::string Scenario::text() const {
   const auto share = [](double x) { return std::to_string(static_cast<int>(1000 * x + 0.5)) + "/1000"; };
   return scene + ", " + std::to_string(steps) + " steps, " + std::to_string(worlds) + " worlds, " +
          (network.sync == border::Sync::kConservative ? "conservative" : "K " + std::to_string(network.window)) +
-         ", delay " + std::to_string(network.delay) + ", slow " + share(network.slow_share) + ", doubled " +
-         share(network.double_share) + ", lost " + share(network.loss_share) + ", stalled " +
-         share(network.stall_share) + ", touched " + share(network.touch_share) + ", lead " +
-         std::to_string(network.lead) + ", " + std::to_string(actions.size()) + " actions, " +
-         std::to_string(transfers.size()) + " transfers" +
+         ", pieces of " + std::to_string(network.piece_bodies) + ", delay " + std::to_string(network.delay) +
+         ", slow " + share(network.slow_share) + ", doubled " + share(network.double_share) + ", lost " +
+         share(network.loss_share) + ", stalled " + share(network.stall_share) + ", touched " +
+         share(network.touch_share) + ", lead " + std::to_string(network.lead) + ", " + std::to_string(actions.size()) +
+         " actions, " + std::to_string(transfers.size()) + " transfers" +
          (network.give_share > 0 ? ", cells given " + share(network.give_share) : "") +
          (network.budget != 0 ? ", balanced" : "");
 }

@@ -126,6 +126,7 @@ class Session {
                                                                                 .last_step = steps,
                                                                                 .sync = network.sync,
                                                                                 .window = network.window,
+                                                                                .piece_bodies = network.piece_bodies,
                                                                                 .transfers = transfers,
                                                                                 .balance = trades(network),
                                                                                 .actions = true},
@@ -318,6 +319,7 @@ void add(border::CoreStats& sum, const border::CoreStats& s) {
   sum.messages_sent += s.messages_sent;
   sum.bytes_sent += s.bytes_sent;
   sum.frames_sent += s.frames_sent;
+  sum.frames_corrected += s.frames_corrected;
   sum.frame_bodies_sent += s.frame_bodies_sent;
   sum.parts_sent += s.parts_sent;
   sum.parts_passed += s.parts_passed;
@@ -326,6 +328,7 @@ void add(border::CoreStats& sum, const border::CoreStats& s) {
   sum.duplicates += s.duplicates;
   sum.refused += s.refused;
   sum.anticipated += s.anticipated;
+  sum.told_early += s.told_early;
   sum.actions += s.actions;
   sum.offers += s.offers;
   sum.offers_declined += s.offers_declined;

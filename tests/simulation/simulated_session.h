@@ -22,6 +22,7 @@ struct StepDigest {
 struct NetworkSettings {
   border::Sync sync = border::Sync::kAnticipative;
   Step window = 48;
+  std::size_t piece_bodies = border::CoreSettings{}.piece_bodies;
   std::uint64_t seed = 1;
   int delay = 5;               // ticks, at most, for an ordinary message
   double slow_share = 0.05;    // of messages that take up to ten times as long: reordering

@@ -106,8 +106,11 @@ TEST(SpatialIndex, KeepsBothPlacesOfABodyThatTwoTellOf) {
 // World 0 owns what is left of x = border; nothing waits, what has foreign bodies is kept for the test.
 class HalfSpace : public Arbiter {
  public:
-  explicit HalfSpace(double border) : border_(border) {}
-  Place place(const BodyState& body, Step) const override { return {body.x().x() < border_ ? 0u : 1u, false, false}; }
+  // Nobody else has to do with what is left of x = `inside`.
+  explicit HalfSpace(double border, double inside = -1e9) : border_(border), inside_(inside) {}
+  Place place(const BodyState& body, Step) const override {
+    return {body.x().x() < border_ ? 0u : 1u, false, body.x().x() < inside_};
+  }
   bool places_change(Step) const override { return false; }
   bool place_changes(const BodyState&, Step) const override { return false; }
   void extended(Step) override {}
@@ -120,14 +123,14 @@ class HalfSpace : public Arbiter {
   int drops = 0;
 
  private:
-  double border_;
+  double border_, inside_;
 };
 
 void advance(Timeline& timeline, Step to) {
   for (Step step = timeline.oldest(); step < to; ++step)
     if (step == timeline.newest() || timeline.has_pending(step)) {
       timeline.process(step);
-      timeline.finish();
+      while (timeline.unfinished() >= 0) timeline.finish();
     }
 }
 
@@ -161,6 +164,44 @@ TEST(Timeline, AloneItDoesWhatTheStepDoes) {
                   before[static_cast<std::size_t>(t - step) * model.bodies().size() + slot]);
     EXPECT_EQ(timeline.stats().bodies_redone, 0u);
   }
+}
+
+// What others hear of is done first, and can be told while the rest is not there yet; the rest comes in pieces; all of
+// it is what the step does at once.
+TEST(Timeline, WhatOthersHearOfComesFirst) {
+  SceneBuilder builder("row");
+  builder.add_ground(200);
+  for (int i = 0; i < 120; ++i) builder.add(Box{Vec3(0.5, 0.5, 0.5)}, Vec3(0.49 * i - 59, 0, 1.5 + 0.1 * (i % 3)));
+  for (int i = 0; i < 60; ++i) builder.add(Sphere{0.2}, Vec3(i - 60, 5, 2));
+  const physics::Model model(builder.finish());
+  HalfSpace space(1e9, -20);
+  Timeline timeline(model, 0, 1, space, 10);
+  physics::Stepper stepper(model);
+  BodySet set = model.initial_state();
+  int in_pieces = 0;
+  for (Step step = 0; step < 90; ++step) {
+    timeline.process(step);
+    ASSERT_EQ(timeline.unfinished_outside(), step);
+    timeline.finish();
+    ASSERT_EQ(timeline.unfinished_outside(), -1);
+    if (timeline.unfinished() == step) {
+      std::size_t done = 0, left = 0;
+      for (const BodyState& body : set.bodies) {
+        const Slot slot = timeline.slot_of(body.id);
+        const bool same = timeline.produced(step, slot) == timeline.produced(step + 1, slot);
+        (same ? left : done) += !body.asleep();
+        EXPECT_TRUE(!same || body.asleep() || body.x().x() < -20) << "body " << body.id << " is not told in time";
+      }
+      in_pieces += done > 0 && left > 0;
+    }
+    int pieces = 1;
+    for (; timeline.unfinished() >= 0; ++pieces) timeline.finish();
+    EXPECT_LE(pieces, 9);
+    stepper.step(set);
+    ASSERT_EQ(physics::test::first_difference(set, timeline.all_produced(step + 1)), "") << "step " << step;
+  }
+  EXPECT_GT(in_pieces, 30);
+  EXPECT_EQ(timeline.stats().bodies_redone, 0u);
 }
 
 TEST(Timeline, WhatRestsIsSharedByAllEntries) {
