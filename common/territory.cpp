@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -59,11 +60,13 @@ class Bisector {
       : grid_(grid), last_axis_(last_axis), straight_(straight), border_(border), owner_(owner) {}
 
   // Gives world `first`'s cells, which are in `region` with `weights`, to `count` worlds from it on. Reorders the
-  // weights.
-  void split(const Region& region, std::span<Weight> weights, WorldId first, WorldId count) {
-    if (count == 1) return;
+  // weights. False: it has cut itself off from a way to give each world a cell.
+  bool split(const Region& region, std::span<Weight> weights, WorldId first, WorldId count) {
+    if (count == 1) return true;
     const WorldId lower = count / 2, second = first + lower;
-    const Cut cut = best_cut(region, weights, first, lower, count);
+    const std::optional<Cut> found = best_cut(region, weights, first, lower, count);
+    if (!found) return false;
+    const Cut& cut = *found;
     Region below = region, above = region;
     below.high[cut.axis] = above.low[cut.axis] = cut.at;
     below.borders |= 2u << 2 * cut.axis, above.borders |= 1u << 2 * cut.axis;
@@ -73,11 +76,11 @@ class Bisector {
     if (!straight_) even_out(cut, weights, {first, lower}, {second, count - lower}, below, above);
     const auto middle =
         std::partition(weights.begin(), weights.end(), [&](const Weight& w) { return owner(cell_of(w)) == first; });
-    split(below, {weights.begin(), middle}, first, lower);
-    split(above, {middle, weights.end()}, second, count - lower);
+    return split(below, {weights.begin(), middle}, first, lower) &&
+           split(above, {middle, weights.end()}, second, count - lower);
   }
 
-  // Whether each world's cells are one piece, by faces.
+  // Whether each world has cells, in one piece by faces.
   bool all_connected(WorldId worlds) const {
     std::vector<std::uint8_t> seen(owner_.size(), 0), begun(worlds, 0);
     std::vector<Cell> todo;
@@ -99,14 +102,15 @@ class Bisector {
           }
       }
     });
-    return connected;
+    return connected && std::count(begun.begin(), begun.end(), 0) == 0;
   }
 
  private:
   struct Cut {
     int axis = 0;
     std::int32_t at = 0;
-    std::int64_t misplaced = 0;  // of the work below it, so much is too much
+    std::int64_t misplaced = 0;              // of the work below it, so much is too much
+    std::size_t cells_below = 0, cells = 0;  // of the region's
   };
   struct Side {
     WorldId first, worlds;
@@ -137,9 +141,10 @@ class Bisector {
 
   // The cut that costs least: bodies on the wrong side are work that one half does while the other waits; bodies within
   // half a cell of the cut are told to the other side, and their islands are solved by both. Where that says nothing
-  // (empty regions), short borders and even halves. Integers only, so that every process agrees.
-  Cut best_cut(const Region& region, std::span<const Weight> weights, WorldId first, WorldId lower,
-               WorldId count) const {
+  // (empty regions), short borders and even halves. Every process must come to the same: integers, and roots, which
+  // IEEE 754 rounds in one way.
+  std::optional<Cut> best_cut(const Region& region, std::span<const Weight> weights, WorldId first, WorldId lower,
+                              WorldId count) const {
     std::array<std::vector<std::size_t>, 3> cells;  // by slice
     std::size_t all_cells = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) cells[axis].assign(region.high[axis] - region.low[axis], 0);
@@ -148,8 +153,7 @@ class Bisector {
       ++all_cells;
       for (std::size_t axis = 0; axis < 3; ++axis) ++cells[axis][c[axis] - region.low[axis]];
     });
-    Cut best;
-    bool found = false;
+    std::optional<Cut> best;
     std::tuple<bool, std::uint64_t, std::uint64_t> best_cost;
     for (int axis = 0; axis < 3; ++axis) {
       const std::int32_t length = region.high[axis] - region.low[axis];
@@ -174,10 +178,11 @@ class Bisector {
         const auto uneven = static_cast<std::uint64_t>(std::abs(2 * static_cast<std::int64_t>(i) - length));
         const std::tuple cost{axis == last_axis_, 4 * static_cast<std::uint64_t>(std::abs(misplaced)) + near,
                               10 * face + uneven};
-        if (!found || cost < best_cost) best = {axis, region.low[axis] + i, misplaced}, best_cost = cost, found = true;
+        if (best && cost >= best_cost) continue;
+        best = {axis, region.low[axis] + i, misplaced, cells_below, all_cells};
+        best_cost = cost;
       }
     }
-    if (!found) throw std::invalid_argument("territories: fewer cells than worlds in a part of the grid");
     return best;
   }
 
@@ -200,6 +205,7 @@ class Bisector {
 
     // By row: what there is in the slice; near the cut, and near where it would be if the row went over.
     struct Row {
+      std::size_t cells = 0;
       std::int64_t work = 0, near_here = 0, near_there = 0;
       std::int64_t near_begin = 0, near_end = 0;  // in the slice, near the row's two ends
     };
@@ -219,6 +225,12 @@ class Bisector {
       row.work += w.cost;
       (w.at[along] % 2 == 0 ? row.near_begin : row.near_end) += w.cost;
     }
+    Region moved = region;
+    moved.low[axis] = slice, moved.high[axis] = slice + 1;
+    for_each(moved, [&](const Cell& c) {
+      if (owner(c) == giver.first) ++rows[static_cast<std::size_t>(c[along] - region.low[along])].cells;
+    });
+    const std::size_t may_go = (down ? cut.cells_below : cut.cells - cut.cells_below) - giver.worlds;
     std::int64_t best = 4 * std::abs(cut.misplaced);
     for (const Row& row : rows) best += row.near_here;
     const std::int64_t near_straight = best - 4 * std::abs(cut.misplaced);
@@ -226,18 +238,19 @@ class Bisector {
     bool from_end = false;
     for (const bool backwards : {false, true}) {
       std::int64_t left = std::abs(cut.misplaced), near = near_straight;
+      std::size_t cells = 0;
       for (std::size_t n = 1; n < count; ++n) {
-        const Row &moved = rows[backwards ? count - n : n - 1], &next = rows[backwards ? count - n - 1 : n];
-        left -= moved.work;
-        near += moved.near_there - moved.near_here;
-        const std::int64_t end = backwards ? moved.near_begin + next.near_end : moved.near_end + next.near_begin;
+        const Row &row = rows[backwards ? count - n : n - 1], &next = rows[backwards ? count - n - 1 : n];
+        cells += row.cells;
+        if (cells > may_go) break;
+        left -= row.work;
+        near += row.near_there - row.near_here;
+        const std::int64_t end = backwards ? row.near_begin + next.near_end : row.near_end + next.near_begin;
         if (4 * std::abs(left) + near + end < best)
           best = 4 * std::abs(left) + near + end, most = n, from_end = backwards;
       }
     }
     if (most == 0) return;
-    Region moved = region;
-    moved.low[axis] = slice, moved.high[axis] = slice + 1;
     if (from_end)
       moved.low[along] = region.high[along] - static_cast<std::int32_t>(most);
     else
@@ -280,14 +293,19 @@ TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds, double
       weights.push_back(
           weight_at(grid, body.pose.position + body.pose.orientation * body.inertial.centre, kDynamicCost));
   }
-  for (const bool straight : {false, true}) {
+  // Where cells are few, only the simplest cuts may leave some for everybody, and in one piece.
+  struct Way {
+    bool straight;
+    double border_bodies;
+  };
+  for (const Way& way : {Way{false, border_bodies}, Way{true, border_bodies}, Way{true, 0}}) {
     TerritoryMap map{grid, worlds, std::vector<WorldId>(grid.cells(), 0)};
-    Bisector bisector(grid, axis_of_gravity(scene.gravity), straight, border_bodies * kDynamicCost, map.owner);
+    Bisector bisector(grid, axis_of_gravity(scene.gravity), way.straight, way.border_bodies * kDynamicCost, map.owner);
     std::vector<Weight> some = weights;
-    bisector.split({{0, 0, 0}, grid.size, 0}, some, 0, worlds);
-    if (straight || bisector.all_connected(worlds)) return map;
+    if (bisector.split({{0, 0, 0}, grid.size, 0}, some, 0, worlds) && bisector.all_connected(worlds)) return map;
   }
-  throw std::logic_error("territories: straight cuts are always possible");
+  throw std::invalid_argument(
+      "territories: fewer cells than worlds in a part of the grid; use fewer worlds (--worlds)");
 }
 
 TerritoryMap initial_territories(const Scene& scene, const Grid& grid, WorldId worlds) {

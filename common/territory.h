@@ -25,7 +25,8 @@ constexpr double kBorderBodies = 110;
 // each, cut where few bodies are, and upright; boxes of cells but for a part of a row at their ends where that makes
 // work more equal. Dynamic bodies count, static things a little, for what comes there touches them; large ones
 // (grounds, walls across many cells) do not; and borders. Every world gets at least one cell. A pure function of its
-// arguments. Throws std::invalid_argument when there are more worlds than cells.
+// arguments. Throws std::invalid_argument when there are more worlds than cells, or so few cells that cuts find none
+// for some world.
 TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds, double border_bodies = kBorderBodies);
 
 // The territories that the scene gives by hand, if it does (Scene::territories), else those of bisect(); a world that

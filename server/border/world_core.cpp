@@ -254,7 +254,11 @@ class WorldCore::Impl final : timeline::Arbiter {
 
   // The same for what others hear of.
   Step told_front() const {
-    if (!told_front_) told_front_ = front_before(timeline_.unfinished_outside());
+    if (!told_front_) {
+      told_front_ = front_before(timeline_.unfinished_outside());
+      // What is left of a round makes work for the steps after it.
+      if (timeline_.unfinished() >= 0) told_front_ = std::min(*told_front_, timeline_.unfinished() + 1);
+    }
     return *told_front_;
   }
 

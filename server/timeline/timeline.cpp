@@ -251,6 +251,8 @@ bool Timeline::is_indexed() const {
 // ---- what users do
 
 void Timeline::act(const LoggedAction& action) {
+  // What is done may be seen by others, and is not to be told with results that are still to come.
+  if (unfinished_ >= 0) outside_pieces_ = piece_ends_.size();
   for (const Effects::Change& change : effects_.add(action))
     for (Step step = std::max(change.first, base_ + 1); step <= std::min(change.last, newest()); ++step)
       do_actions(step, change.body);

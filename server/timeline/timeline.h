@@ -124,14 +124,14 @@ class Timeline {
   std::span<const Slot> pending(Step step) const { return at(step).pending; }
   // Does step -> step + 1 for what is pending and what that affects, in parts: `process` finds the islands and hands
   // those that must wait to the arbiter; each call of `finish` solves some of the others, until unfinished() is -1.
-  // First those of which others may hear: bodies that are inside (Place) at `step` are hardly heard of at the next (if
-  // one is, that is news of step + 1 like any other). In between, the arbiter's news may be sent, islands settled, and
-  // more may be heard. Makes the entry `step + 1` if it is not there.
+  // First those of which others may hear: bodies that are inside (Place) at `step` are rarely heard of at the next (if
+  // one is, that is news of step + 1 like any other), but where something is done to them there. In between, the
+  // arbiter's news may be sent, islands settled, and more may be heard. Makes the entry `step + 1` if it is not there.
   void process(Step step);
   void finish();
   Step unfinished() const { return unfinished_; }  // the step of a round that waits for finish(), else -1
   // The same as long as that round has islands of which others may hear.
-  Step unfinished_outside() const { return outside_left_ ? unfinished_ : -1; }
+  Step unfinished_outside() const { return pieces_done_ < outside_pieces_ ? unfinished_ : -1; }
   // Results of own bodies of islands that the arbiter kept.
   void settle(Step step, const BodySet& results);
   // Does all of an entry's step again, for tests: what it finds must be what is there.
@@ -261,10 +261,10 @@ class Timeline {
   std::size_t own_contacts_ = 0;
   std::vector<physics::Ends> ends_;
   physics::Islands islands_;
-  std::vector<std::uint32_t> solved_;    // islands, by piece
-  std::vector<std::size_t> piece_ends_;  // in solved_
-  std::size_t pieces_done_ = 0;
-  bool outside_left_ = false;                  // the next piece has bodies of which others may hear
+  std::vector<std::uint32_t> solved_;                 // islands, by piece
+  std::vector<std::size_t> piece_ends_;               // in solved_
+  std::size_t pieces_done_ = 0, outside_pieces_ = 0;  // the latter: with bodies of which others may hear
+  bool counted_as_redone_ = false;
   std::vector<std::uint32_t> inner_;           // islands of which nobody hears
   std::vector<std::uint8_t> piece_of_;         // by position in bodies_: which piece has its result, from 1; 0: none
   std::vector<std::uint32_t> contacts_begin_;  // by position in bodies_, in contacts_

@@ -135,6 +135,7 @@ bool Timeline::grown(Step step) {
 void Timeline::process(Step step) {
   changed_.clear();
   in_changed_.clear();
+  counted_as_redone_ = false;
   for (const Slot slot : at(step).pending)
     if (in_changed_.add(slot)) changed_.push_back(slot);
   at(step).pending.clear();
@@ -194,6 +195,7 @@ void Timeline::sort_out(Step step, bool all) {
   }
   solved_.clear();
   inner_.clear();
+  acting_ = effects_.acted_on(step + 1);
   const bool all_outside = piece_bodies_ == kWhole || told_.empty() || arbiter_.places_change(step + 1);
   for (std::uint32_t k = 0; k < islands_.size(); ++k) {
     const auto members = islands_.bodies_of(k);
@@ -204,7 +206,8 @@ void Timeline::sort_out(Step step, bool all) {
         foreign = true;
       else if (records_[i]->place.wide && !records_[i]->place.inside)
         wide = true;
-      inside = inside && records_[i]->place.inside;
+      inside =
+          inside && records_[i]->place.inside && !std::binary_search(acting_.begin(), acting_.end(), bodies_[i].id);
     }
     bool wait = foreign || wide;
     if (!wait && may_wait) {
@@ -236,7 +239,6 @@ void Timeline::divide() {
   std::size_t bodies = 0;
   for (const std::uint32_t k : inner_) bodies += islands_.bodies_of(k).size();
   const std::size_t most = std::max(piece_bodies_, bodies / (kMostPieces - 1) + 1);
-  outside_left_ = true;
   piece_ends_.clear();
   if (bodies >= most) piece_ends_.push_back(solved_.size());
   // Large islands together, by as many as the solver does at once.
@@ -254,6 +256,7 @@ void Timeline::divide() {
   }
   if (piece_ends_.empty() || piece_ends_.back() != solved_.size()) piece_ends_.push_back(solved_.size());
   pieces_done_ = 0;
+  outside_pieces_ = 1;
 
   piece_of_.assign(bodies_.size(), 0);
   std::size_t first = 0;
@@ -291,7 +294,6 @@ void Timeline::finish() {
   stepper_.solve(bodies_, contacts_, ends_, islands_, std::span(solved_).subspan(first, end - first));
   const Step step = unfinished_;
   ++pieces_done_;
-  outside_left_ = false;
   if (pieces_done_ == piece_ends_.size()) unfinished_ = -1;
   results_.clear();
   acting_ = effects_.acted_on(step + 1);
@@ -299,7 +301,9 @@ void Timeline::finish() {
     if (piece_of_[i] == pieces_done_)
       take_result(step + 1, around_[i], bodies_[i],
                   std::span(contacts_).subspan(contacts_begin_[i], contacts_begin_[i + 1] - contacts_begin_[i]));
+  const std::uint64_t redone = stats_.steps_redone;
   store(step + 1, results_);
+  if (stats_.steps_redone > redone && std::exchange(counted_as_redone_, true)) stats_.steps_redone = redone;
 }
 
 }  // namespace soda::timeline

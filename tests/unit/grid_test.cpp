@@ -147,6 +147,52 @@ TEST(Territories, AreEvenThoughCellsAreCoarse) {
   EXPECT_GT(corners, middle + 4 * 1.5 * kBorderBodies) << corners << " and " << middle;
 }
 
+// Bodies in clumps, and not many more cells than worlds. (Where a clump has most of the work and few cells, cuts may
+// find none for some world: then they say so.)
+TEST(Territories, LeaveCellsForEverybody) {
+  int uneven = 0, refused = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    Random random(seed);
+    SceneBuilder builder("clumps");
+    Grid grid;
+    grid.size = {static_cast<std::int32_t>(4 + random.below(30)), static_cast<std::int32_t>(4 + random.below(30)),
+                 static_cast<std::int32_t>(1 + random.below(3))};
+    const Vec3 size(grid.size[0], grid.size[1], grid.size[2]);
+    std::vector<Vec3> clumps;
+    for (int i = 0; i < 6; ++i) clumps.push_back(random.between(Vec3::Zero(), size));
+    const std::uint32_t bodies = 20 + random.below(800);
+    for (std::uint32_t i = 0; i < bodies; ++i)
+      builder.add(Sphere{0.1}, clumps[random.below(6)] + random.between(Vec3::Constant(-1), Vec3::Constant(1)));
+    const auto worlds = static_cast<WorldId>(std::max<std::size_t>(2, grid.cells() / (6 + random.below(20))));
+    TerritoryMap map;
+    try {
+      map = bisect(builder.finish(), grid, worlds);
+    } catch (const std::invalid_argument&) {
+      ++refused;
+      continue;
+    }
+    for (WorldId w = 0; w < worlds; ++w)
+      ASSERT_TRUE(connected(map, w)) << "seed " << seed << ": world " << w << " of " << worlds;
+    // Not all are boxes.
+    for (WorldId w = 0; w < worlds && uneven < 100; ++w) {
+      Cell low = grid.size, high{-1, -1, -1};
+      std::int32_t cells = 0;
+      for (std::int32_t z = 0; z < grid.size[2]; ++z)
+        for (std::int32_t y = 0; y < grid.size[1]; ++y)
+          for (std::int32_t x = 0; x < grid.size[0]; ++x) {
+            const Cell c{x, y, z};
+            if (map.owner[grid.index(c)] != w) continue;
+            ++cells;
+            for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], c[a]), high[a] = std::max(high[a], c[a]);
+          }
+      uneven += cells < (high[0] - low[0] + 1) * (high[1] - low[1] + 1) * (high[2] - low[2] + 1);
+    }
+  }
+  EXPECT_EQ(uneven, 100);
+  EXPECT_LT(refused, 15);
+  RecordProperty("refused", refused);
+}
+
 TEST(Territories, AreAPureFunctionOfTheirArguments) {
   const Scene scene = generate("city", 500, 4);
   const Grid grid = make_grid(scene);
