@@ -112,12 +112,33 @@ void put_frame(std::vector<std::byte>& out, const Frame& frame) {
   encode_set(frame.set, out);
 }
 
-Frame get_frame(Reader& in, std::span<const std::byte>& rest, const physics::Model& model) {
-  Frame frame;
+void get_set(std::span<const std::byte>& bytes, const physics::Model& model, BodySet& set) {
+  Reader in(bytes);
+  const std::size_t bodies = in.count(sizeof(BodyState), "bodies");
+  const std::size_t contacts = in.count(kRecordHead, "contacts");
+  set.bodies.resize(bodies);
+  in.get_bytes(set.bodies.data(), bodies * sizeof(BodyState), "bodies");
+  for (std::size_t i = 0; i < bodies; ++i) {
+    check(set.bodies[i], model);
+    if (i > 0 && set.bodies[i].id <= set.bodies[i - 1].id) throw CodecError(name(set.bodies[i].id) + ": out of order");
+  }
+  set.contacts.assign(contacts, {});
+  for (std::size_t i = 0; i < contacts; ++i) {
+    ContactRecord& record = set.contacts[i];
+    in.get_bytes(&record, kRecordHead, "contact record");
+    if (record.count < 1 || record.count > kMaxContactPoints)
+      throw CodecError("contact of " + name(record.a) + ": number of points");
+    in.get_bytes(record.points, record.count * sizeof(ContactPoint), "contact points");
+    check(record, model);
+    if (i > 0 && !record_before(set.contacts[i - 1], record))
+      throw CodecError("contact of " + name(record.a) + ": out of order");
+  }
+}
+
+void get_frame(Reader& in, std::span<const std::byte>& rest, const physics::Model& model, Frame& frame) {
   frame.step = in.get<Step>("frame step");
   frame.revision = in.get<Revision>("frame revision");
-  frame.set = decode_set(rest, model);
-  return frame;
+  get_set(rest, model, frame.set);
 }
 
 void put_part(std::vector<std::byte>& out, const Part& part) {
@@ -292,27 +313,8 @@ void encode_set(const BodySet& set, std::vector<std::byte>& out) {
 }
 
 BodySet decode_set(std::span<const std::byte>& bytes, const physics::Model& model) {
-  Reader in(bytes);
   BodySet set;
-  const std::size_t bodies = in.count(sizeof(BodyState), "bodies");
-  const std::size_t contacts = in.count(kRecordHead, "contacts");
-  set.bodies.resize(bodies);
-  in.get_bytes(set.bodies.data(), bodies * sizeof(BodyState), "bodies");
-  for (std::size_t i = 0; i < bodies; ++i) {
-    check(set.bodies[i], model);
-    if (i > 0 && set.bodies[i].id <= set.bodies[i - 1].id) throw CodecError(name(set.bodies[i].id) + ": out of order");
-  }
-  set.contacts.resize(contacts);
-  for (std::size_t i = 0; i < contacts; ++i) {
-    ContactRecord& record = set.contacts[i];
-    in.get_bytes(&record, kRecordHead, "contact record");
-    if (record.count < 1 || record.count > kMaxContactPoints)
-      throw CodecError("contact of " + name(record.a) + ": number of points");
-    in.get_bytes(record.points, record.count * sizeof(ContactPoint), "contact points");
-    check(record, model);
-    if (i > 0 && !record_before(set.contacts[i - 1], record))
-      throw CodecError("contact of " + name(record.a) + ": out of order");
-  }
+  get_set(bytes, model, set);
   return set;
 }
 
@@ -358,25 +360,38 @@ Header decode_header(std::span<const std::byte> bytes) {
   return get_header(in);
 }
 
-Message decode(std::span<const std::byte> bytes, const physics::Model& model) {
+Message& Decoder::decode(std::span<const std::byte> bytes, const physics::Model& model) {
+  for (Frame& frame : message_.frames) spare_.push_back(std::move(frame.set));
+  message_.clear();
   std::span<const std::byte> rest = bytes;
   Reader in(rest);
-  Message message;
-  message.header = get_header(in);
+  message_.header = get_header(in);
   const std::size_t frames = in.count(24, "frames"), parts = in.count(24, "parts"),
                     finals = in.count(20, "final parts");
-  for (std::size_t i = 0; i < frames; ++i) message.frames.push_back(get_frame(in, rest, model));
-  for (std::size_t i = 0; i < parts; ++i) message.parts.push_back(get_part(in, rest, model));
+  for (std::size_t i = 0; i < frames; ++i) {
+    Frame& frame = message_.frames.emplace_back();
+    if (!spare_.empty()) {
+      frame.set = std::move(spare_.back());
+      spare_.pop_back();
+    }
+    get_frame(in, rest, model, frame);
+  }
+  for (std::size_t i = 0; i < parts; ++i) message_.parts.push_back(get_part(in, rest, model));
   for (std::size_t i = 0; i < finals; ++i) {
     FinalPart part;
     part.origin = in.get<WorldId>("final part origin");
     part.step = in.get<Step>("final part step");
     part.revision = in.get<Revision>("final part revision");
-    message.finals.push_back(part);
+    message_.finals.push_back(part);
   }
-  get_territory(in, message);
+  get_territory(in, message_);
   if (!in.empty()) throw CodecError("border message: more bytes than it says");
-  return message;
+  return message_;
+}
+
+Message decode(std::span<const std::byte> bytes, const physics::Model& model) {
+  Decoder decoder;
+  return std::move(decoder.decode(bytes, model));
 }
 
 }  // namespace soda::border

@@ -26,6 +26,16 @@ void encode(const Message& message, std::vector<std::byte>& out);  // in place o
 // have. What it returns can be trusted to be well-formed, not to be true.
 Message decode(std::span<const std::byte> bytes, const physics::Model& model);
 
+// The same again and again, into the memory of the message before: what decode() returned before is gone then.
+class Decoder {
+ public:
+  Message& decode(std::span<const std::byte> bytes, const physics::Model& model);
+
+ private:
+  Message message_;
+  std::vector<BodySet> spare_;  // of frames
+};
+
 // The beginning alone: who speaks to whom.
 Header decode_header(std::span<const std::byte> bytes);
 

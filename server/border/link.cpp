@@ -9,6 +9,7 @@ namespace {
 
 // Messages that a peer may be ahead of what has arrived: far more than windows allow.
 constexpr std::uint64_t kFarthest = 1u << 14;
+constexpr std::size_t kSpare = 8;
 
 }  // namespace
 
@@ -38,16 +39,15 @@ void Link::send(Step upto, Step final_step, Step near_final, ActionNumber logged
   told_near_final_ = near_final;
   next_.header = header(++sent_, false);
   next_.header.logged = logged;
-  encode(next_, scratch_);
-  log_.push_back(scratch_);
-  out.push_back(log_.back());
-  next_.frames.clear();
-  next_.parts.clear();
-  next_.finals.clear();
-  next_.transfers.clear();
-  next_.offers.clear();
-  next_.answers.clear();
-  next_.load.reset();
+  std::vector<std::byte> bytes;
+  if (!spare_.empty()) {
+    bytes = std::move(spare_.back());
+    spare_.pop_back();
+  }
+  encode(next_, bytes);
+  out.push_back(bytes);
+  log_.push_back(std::move(bytes));
+  next_.clear();
 }
 
 void Link::interrupted() { ask_ = repeat_ = true; }
@@ -65,31 +65,40 @@ void Link::collect(std::vector<std::vector<std::byte>>& out) {
   }
 }
 
-void Link::receive(Message message, const std::function<void(Message&)>& deliver) {
+void Link::receive(Message& message, const std::function<void(Message&)>& deliver) {
   const Header& h = message.header;
   if ((peer_epoch_ && *peer_epoch_ != h.epoch) || (h.sequence > 0 && h.to_epoch != 0 && h.to_epoch != epoch_))
     throw CodecError("border message of another start of world " + std::to_string(h.from) + " or of this one");
   if (h.sequence > received_ + kFarthest)
     throw CodecError("border message " + std::to_string(h.sequence) + " is too far ahead");
   const std::uint64_t logged_before = sent_ - log_.size();
-  if (h.ack > logged_before && h.ack <= sent_)
-    log_.erase(log_.begin(), log_.begin() + static_cast<std::ptrdiff_t>(h.ack - logged_before));
+  if (h.ack <= sent_)
+    for (std::uint64_t n = logged_before; n < h.ack; ++n) {
+      if (spare_.size() < kSpare) spare_.push_back(std::move(log_.front()));
+      log_.pop_front();
+    }
   if (h.need) repeat_ = true;
   if (h.sequence == 0) return;
   if (h.sequence <= received_ || early_.contains(h.sequence)) {
     ++duplicates_;
     return;
   }
-  early_.emplace(h.sequence, std::move(message));
-  while (!early_.empty() && early_.begin()->first == received_ + 1) {
-    Message next = std::move(early_.begin()->second);
-    early_.erase(early_.begin());
+  const auto take = [&](Message& next) {
     deliver(next);  // a message that is refused does not count, and will be asked for again
     ++received_;
     peer_epoch_ = next.header.epoch;
     upto_ = next.header.upto;
     final_ = std::max(final_, next.header.final_step);
     near_final_ = std::max(near_final_, next.header.near_final);
+  };
+  if (h.sequence == received_ + 1)
+    take(message);
+  else
+    early_.emplace(h.sequence, std::move(message));
+  while (!early_.empty() && early_.begin()->first == received_ + 1) {
+    Message next = std::move(early_.begin()->second);
+    early_.erase(early_.begin());
+    take(next);
   }
   if (!early_.empty() && asked_after_ != received_) ask_ = true;
 }

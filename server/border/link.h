@@ -52,9 +52,9 @@ class Link {
   void collect(std::vector<std::vector<std::byte>>& out);
 
   // ---- in
-  // Takes a decoded message from the peer; hands every message whose turn has come to `deliver`, in order. Throws
-  // CodecError for one of another start of the peer, or to another start of this world.
-  void receive(Message message, const std::function<void(Message&)>& deliver);
+  // Takes a decoded message from the peer, away where it comes early; hands every message whose turn has come to
+  // `deliver`, in order. Throws CodecError for one of another start of the peer, or to another start of this world.
+  void receive(Message& message, const std::function<void(Message&)>& deliver);
 
   // The peer's values, counted: everything said before them has been delivered.
   Step upto() const { return upto_; }
@@ -77,9 +77,9 @@ class Link {
 
   Message next_;
   Step told_upto_ = -1, told_final_ = -1, told_near_final_ = -1;
-  std::uint64_t sent_ = 0;                  // newest number sent
-  std::deque<std::vector<std::byte>> log_;  // messages sent_ - log_.size() + 1 .. sent_
-  std::vector<std::byte> scratch_;
+  std::uint64_t sent_ = 0;                     // newest number sent
+  std::deque<std::vector<std::byte>> log_;     // messages sent_ - log_.size() + 1 .. sent_
+  std::vector<std::vector<std::byte>> spare_;  // memory for messages to come
   bool repeat_ = false, ask_ = false;
 
   std::uint64_t received_ = 0;                     // everything up to this number has been delivered

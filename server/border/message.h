@@ -99,6 +99,16 @@ struct Message {
   std::vector<Offer> offers;
   std::vector<Answer> answers;
   std::optional<Load> load;
+
+  void clear() {  // but for the header
+    frames.clear();
+    parts.clear();
+    finals.clear();
+    transfers.clear();
+    offers.clear();
+    answers.clear();
+    load.reset();
+  }
 };
 
 }  // namespace soda::border

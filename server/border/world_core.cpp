@@ -55,9 +55,9 @@ class WorldCore::Impl final : timeline::Arbiter {
         held_back_.keep(h.logged, bytes);
         return true;
       }
-      Message message = decode(bytes, model_);
+      Message& message = decoder_.decode(bytes, model_);
       check(message, settings_.me, territories_.worlds());
-      return take(*link, std::move(message));
+      return take(*link, message);
     } catch (const CodecError& error) {
       return refuse(error);
     }
@@ -70,12 +70,12 @@ class WorldCore::Impl final : timeline::Arbiter {
   }
 
   // Whatever of the stream could be delivered counts, also where a later message is refused.
-  bool take(Link& link, Message message) {
+  bool take(Link& link, Message& message) {
     const std::uint64_t before = link.duplicates();
     const Step near_final = link.near_final();
     bool good = true;
     try {
-      link.receive(std::move(message), [&](Message& m) { deliver(link, m); });
+      link.receive(message, [&](Message& m) { deliver(link, m); });
     } catch (const CodecError& error) {
       good = refuse(error);
     }
@@ -441,6 +441,7 @@ class WorldCore::Impl final : timeline::Arbiter {
   Observer& observer_;
   CoreStats stats_;
   std::string refusal_;
+  Decoder decoder_;
   Step final_ = -1, near_final_ = -1, limit_ = std::numeric_limits<Step>::max();
   ActionNumber logged_ = 0;
   Closings closings_;

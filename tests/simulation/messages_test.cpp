@@ -256,7 +256,8 @@ TEST(Link, DeliversInOrderAndRepeatsWhatWasLost) {
   std::vector<Step> got;
   const auto deliver = [&](Message& m) { got.push_back(m.header.upto); };
   const auto give = [&](border::Link& to, const std::vector<std::byte>& bytes) {
-    to.receive(border::decode(bytes, model), deliver);
+    Message message = border::decode(bytes, model);
+    to.receive(message, deliver);
   };
   give(in, sent[1]);  // 0 is late, 2 is lost
   give(in, sent[1]);
