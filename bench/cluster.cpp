@@ -64,16 +64,16 @@ double MeasuredCosts::clipped(WorldId world, const border::WorldCore& core, doub
 }
 
 Cluster::Cluster(const Scene& scene, const TerritoryMap& map, const border::CoreSettings& settings,
-                 const Network& network, Costs& costs)
+                 const Network& network, Costs& costs, bool with_worlds)
     : settings_(settings), network_(network), costs_(costs), model_(scene), map_(map), worlds_(map.worlds) {
-  for (WorldId w = 0; w < worlds(); ++w) {
+  for (WorldId w = 0; with_worlds && w < worlds(); ++w) {
     worlds_[w].core = make_core(w);
     if (settings.balance)
       worlds_[w].balancer = std::make_unique<balance::Balancer>(*worlds_[w].core, map_.grid, w, scene.dt);
   }
 }
 
-std::unique_ptr<border::WorldCore> Cluster::make_core(WorldId w) {
+std::unique_ptr<border::WorldCore> Cluster::make_core(WorldId w) const {
   border::CoreSettings settings = settings_;
   settings.me = w;
   return std::make_unique<border::WorldCore>(model_, map_, settings, ignores_);
@@ -136,10 +136,10 @@ Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, balance::Balance
   return done;
 }
 
-Cluster::Usage Cluster::replay(WorldId w, Costs& costs) {
+Cluster::Usage Cluster::replay(WorldId w, const std::vector<Piece>& pieces, Costs& costs) const {
   const auto core = make_core(w);
   Usage usage;
-  for (const Piece& piece : worlds_[w].pieces) (void)work(w, *core, nullptr, piece, costs, usage);
+  for (const Piece& piece : pieces) (void)work(w, *core, nullptr, piece, costs, usage);
   return usage;
 }
 

@@ -99,15 +99,20 @@ class Cluster {
   struct Order {
     Step limit, closed;
   };
+  struct Piece {  // what a world is given before it works
+    std::optional<Order> order;
+    std::vector<std::vector<std::byte>> messages;
+    bool patient = true;
+  };
   struct Usage {
     std::array<double, kActivities> seconds{};  // by Activity
     std::uint64_t pieces = 0;                   // of work that did something
     double busy() const { return seconds[0] + seconds[1] + seconds[2] + seconds[3]; }
   };
 
-  // `settings.me` is set for each world. `costs` must outlive the cluster.
+  // `settings.me` is set for each world. `costs` must outlive the cluster. Without worlds it can only replay.
   Cluster(const Scene& scene, const TerritoryMap& map, const border::CoreSettings& settings, const Network& network,
-          Costs& costs);
+          Costs& costs, bool with_worlds = true);
 
   // How fast the session is shown: for worlds that balance their loads (settings.balance). Such cannot be replayed.
   balance::Pace pace;
@@ -126,10 +131,11 @@ class Cluster {
   void stop() { stopped_ = true; }
 
   // Before run(): keeps what a world is given, so that replay() can do the same again with a fresh core, piece by
-  // piece, and the cluster out of the way: what the world costs on a machine of its own, whose caches it need not
-  // share.
+  // piece, in another process if need be: what the world costs on a machine of its own, whose caches and heap it need
+  // not share.
   void record(WorldId w) { worlds_[w].recorded = true; }
-  Usage replay(WorldId w, Costs& costs);
+  const std::vector<Piece>& recorded(WorldId w) const { return worlds_[w].pieces; }
+  Usage replay(WorldId w, const std::vector<Piece>& pieces, Costs& costs) const;
 
  private:
   struct Event {
@@ -137,11 +143,6 @@ class Cluster {
     std::uint64_t number;
     std::function<void()> happens;
     bool operator<(const Event& o) const { return time != o.time ? time > o.time : number > o.number; }
-  };
-  struct Piece {  // what a world is given before it works
-    std::optional<Order> order;
-    std::vector<std::vector<std::byte>> messages;
-    bool patient = true;
   };
   struct World {
     std::unique_ptr<border::WorldCore> core;
@@ -158,7 +159,7 @@ class Cluster {
     double seconds;
     std::vector<border::Outgoing> out;
   };
-  std::unique_ptr<border::WorldCore> make_core(WorldId w);
+  std::unique_ptr<border::WorldCore> make_core(WorldId w) const;
   Done work(WorldId w, border::WorldCore& core, balance::Balancer* balancer, const Piece& piece, Costs& costs,
             Usage& usage) const;
   void look(WorldId w);
@@ -168,8 +169,8 @@ class Cluster {
   const border::CoreSettings settings_;
   const Network network_;
   Costs& costs_;
-  border::Observer ignores_;
-  physics::Model model_;  // shared: nothing is spawned, and a thousand copies of a large scene would not fit
+  mutable border::Observer ignores_;
+  mutable physics::Model model_;  // shared: nothing is spawned, and a thousand copies of a large scene would not fit
   TerritoryMap map_;
   std::vector<World> worlds_;
   std::vector<Event> events_;  // a heap

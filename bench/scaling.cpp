@@ -23,6 +23,7 @@
 #include "bench/commands.h"
 #include "bench/lone_core.h"
 #include "bench/message_costs.h"
+#include "bench/piece_file.h"
 #include "bench/session_runs.h"
 #include "common/scene/generators.h"
 
@@ -101,27 +102,17 @@ class Run {
     costs_.factors = factors;
   }
 
-  // What a world's work costs alone against what it costs here, where all share one processor's caches. By some worlds.
-  Factors factors() {
-    std::vector<WorldId> some;
-    for (WorldId i = 0; i < kReplayed; ++i)
-      if (const WorldId w = (2 * i + 1) * cluster_.worlds() / (2 * kReplayed); some.empty() || w != some.back())
-        some.push_back(w);
+  // The session with what some worlds are given kept in `file`, for alone() in another process; what they cost here.
+  Cluster::Usage together(const std::vector<WorldId>& some, std::FILE* file) {
     for (const WorldId w : some) cluster_.record(w);
     cluster_.run();
-    Cluster::Usage together, alone;
+    Cluster::Usage sum;
     for (const WorldId w : some) {
-      MeasuredCosts costs(&yardstick_);
-      const Cluster::Usage replayed = cluster_.replay(w, costs);
-      for (std::size_t a = 0; a < kActivities; ++a) {
-        together.seconds[a] += cluster_.usage(w).seconds[a];
-        alone.seconds[a] += replayed.seconds[a];
-      }
+      for (std::size_t a = 0; a < kActivities; ++a) sum.seconds[a] += cluster_.usage(w).seconds[a];
+      keep(cluster_.recorded(w), file);
     }
-    Factors factors;
-    for (std::size_t a = 0; a < kActivities; ++a)
-      factors[a] = together.seconds[a] > 0 ? alone.seconds[a] / together.seconds[a] : 1;
-    return factors;
+    std::fflush(file);
+    return sum;
   }
 
   Outcome outcome() {
@@ -225,7 +216,7 @@ class Experiment {
     Outcome best;
     for (int round = 0; round < rounds_; ++round) {
       Outcome o = apart([&] {
-        warm_heap(heap());
+        warm_heap(heap(worlds_));
         return Run(scene_, worlds_, mode, network, steps_, factors, yardstick_).outcome();
       });
       o.alone = factors[static_cast<std::size_t>(Activity::kWorking)];
@@ -235,18 +226,46 @@ class Experiment {
   }
 
  private:
+  // What a world's work costs in a process of its own against what it costs among the others, where all share one
+  // processor's caches and one heap. By some worlds, with the same messages.
   Factors factors(const Mode& mode, const Network& network) {
     std::optional<Factors>& known = factors_[mode.sync == border::Sync::kAnticipative];
     if (worlds_ == 1) return kAlone;
-    if (!known)
-      known = apart([&] {
-        warm_heap(heap());
-        return Run(scene_, worlds_, {mode.name, mode.sync, false}, network, steps_ / 3, kAlone, yardstick_).factors();
+    if (known) return *known;
+    std::vector<WorldId> some;
+    for (WorldId i = 0; i < kReplayed; ++i)
+      if (const WorldId w = (2 * i + 1) * worlds_ / (2 * kReplayed); some.empty() || w != some.back())
+        some.push_back(w);
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
+    if (!file) throw std::runtime_error("cannot keep what worlds are given");
+    const Step steps = steps_ / 3;
+    const Cluster::Usage together = apart([&] {
+      warm_heap(heap(worlds_));
+      return Run(scene_, worlds_, {mode.name, mode.sync, false}, network, steps, kAlone, yardstick_)
+          .together(some, file.get());
+    });
+    std::rewind(file.get());
+    Cluster::Usage alone;
+    for (const WorldId w : some) {
+      const std::vector<Cluster::Piece> pieces = kept(file.get());
+      const Cluster::Usage one = apart([&] {
+        warm_heap(heap(1));
+        MeasuredCosts costs(&yardstick_);
+        return Cluster(scene_, bisect(scene_, make_grid(scene_), worlds_),
+                       {.last_step = steps, .sync = mode.sync, .window = kWindow}, network, costs, false)
+            .replay(w, pieces, costs);
       });
+      for (std::size_t a = 0; a < kActivities; ++a) alone.seconds[a] += one.seconds[a];
+    }
+    known.emplace();
+    for (std::size_t a = 0; a < kActivities; ++a)
+      (*known)[a] = together.seconds[a] > 0 ? alone.seconds[a] / together.seconds[a] : 1;
     return *known;
   }
   // Bytes: records of a body at all steps of a window, and a start for each world.
-  std::size_t heap() const { return scene_.bodies.size() * 40'000 + worlds_ * (std::size_t{2} << 20); }
+  std::size_t heap(WorldId worlds) const {
+    return scene_.bodies.size() / worlds_ * worlds * 40'000 + worlds * (std::size_t{2} << 20);
+  }
 
   const Scene& scene_;
   const WorldId worlds_;

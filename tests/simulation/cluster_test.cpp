@@ -40,8 +40,9 @@ class ModelOfACluster : public testing::Test {
     for (std::size_t i = 0; i < owner.size(); ++i)
       owner[i] =
           worlds == 1 ? 0 : 2 * static_cast<std::int32_t>(i % static_cast<std::size_t>(grid.size[0])) >= grid.size[0];
-    cluster_ = std::make_unique<Cluster>(scene, TerritoryMap{grid, worlds, owner},
-                                         border::CoreSettings{.last_step = kSteps, .sync = sync}, network, costs_);
+    map_ = {grid, worlds, owner};
+    cluster_ = std::make_unique<Cluster>(scene, map_, border::CoreSettings{.last_step = kSteps, .sync = sync}, network,
+                                         costs_);
     double end = 0;
     computed_ = -1;
     cluster_->worked = [&](WorldId) {
@@ -62,6 +63,7 @@ class ModelOfACluster : public testing::Test {
 
   BodyCosts costs_ = by_the_body();
   double computed_ = 0;  // s, when all had done the last step
+  TerritoryMap map_;
   std::unique_ptr<Cluster> cluster_;
 };
 
@@ -114,7 +116,9 @@ TEST_F(ModelOfACluster, MessagesTakeTheirTimeOfTheProcessorAndOfTheLine) {
 TEST_F(ModelOfACluster, ARecordedWorldDoesTheSameAgain) {
   (void)run(2, border::Sync::kAnticipative, {.latency = 1, .send_seconds = 0.5});
   BodyCosts again = by_the_body();
-  const Cluster::Usage replayed = cluster_->replay(1, again);
+  const Cluster::Usage replayed = cluster_->replay(1, cluster_->recorded(1), again);
+  const Cluster nobody(two_groups(), map_, {.last_step = kSteps}, {.send_seconds = 0.5}, again, false);
+  EXPECT_EQ(nobody.replay(1, cluster_->recorded(1), again).seconds, replayed.seconds) << "where there are no others";
   EXPECT_EQ(replayed.pieces, cluster_->usage(1).pieces);
   EXPECT_EQ(replayed.seconds, cluster_->usage(1).seconds);
   EXPECT_GT(replayed.busy(), 0);
