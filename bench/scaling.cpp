@@ -323,13 +323,15 @@ std::string key(const std::string& what, WorldId worlds, const Mode& mode) {
 
 void strong(const Scene& scene, const Size& size, const Network& network, int rounds, Yardstick& yardstick,
             Tables& tables, Headline& headline, Common& common) {
-  double one = 0;
+  Experiment lone(scene, 1, size.steps, rounds, yardstick);
   for (const WorldId worlds : size.strong) {
     Experiment experiment(scene, worlds, size.steps, rounds, yardstick);
+    // Anew beside each size: what others do on the machine, or its host, slows a large world down more than small ones.
+    const Outcome alone = lone.run(kAnticipative, network);
+    const double one = alone.step;
     for (const Mode& mode : kModes) {
       if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;  // alone, all are the same
-      const Outcome o = experiment.run(mode, network);
-      if (worlds == 1) one = o.step;
+      const Outcome o = worlds == 1 ? alone : experiment.run(mode, network);
       const auto efficiency = [&](const Outcome& of) { return one / of.step / worlds; };
       tables.add("strong", mode, worlds, size.bodies, o, one);
       headline.add(key("city.efficiency", worlds, mode), efficiency(o));
