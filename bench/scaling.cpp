@@ -102,7 +102,7 @@ class Run {
     costs_.factors = factors;
   }
 
-  // The session with what some worlds are given kept in `file`, for alone() in another process; what they cost here.
+  // The session, with what some worlds are given kept in `file`, to be replayed elsewhere; what they cost here.
   Cluster::Usage together(const std::vector<WorldId>& some, std::FILE* file) {
     for (const WorldId w : some) cluster_.record(w);
     cluster_.run();

@@ -231,9 +231,9 @@ class Bisector {
       if (owner(c) == giver.first) ++rows[static_cast<std::size_t>(c[along] - region.low[along])].cells;
     });
     const std::size_t may_go = (down ? cut.cells_below : cut.cells - cut.cells_below) - giver.worlds;
-    std::int64_t best = 4 * std::abs(cut.misplaced);
-    for (const Row& row : rows) best += row.near_here;
-    const std::int64_t near_straight = best - 4 * std::abs(cut.misplaced);
+    std::int64_t near_straight = 0;
+    for (const Row& row : rows) near_straight += row.near_here;
+    std::int64_t best = 4 * std::abs(cut.misplaced) + near_straight;
     std::size_t most = 0;
     bool from_end = false;
     for (const bool backwards : {false, true}) {

@@ -36,8 +36,7 @@ std::uint64_t Announcer::wanted(Step step, const timeline::Record& record) const
 void Announcer::update(Step step) {
   context_.timeline.take_changed(step, changed_);
   if (changed_.empty() || books_.empty()) return;
-  added_.resize(books_.size());
-  for (NearBodies& added : added_) added.clear();
+  added_.resize(books_.size());  // all empty
   for (const timeline::Slot slot : changed_) {
     const Ref<timeline::Record> record = context_.timeline.share(step, slot);
     if (!record || context_.timeline.inside(*record)) continue;

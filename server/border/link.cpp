@@ -9,7 +9,7 @@ namespace {
 
 // Messages that a peer may be ahead of what has arrived: far more than windows allow.
 constexpr std::uint64_t kFarthest = 1u << 14;
-constexpr std::size_t kSpare = 8;
+constexpr std::size_t kSpare = 8;  // messages whose memory is kept: more than are on their way, mostly
 
 }  // namespace
 

@@ -447,9 +447,9 @@ class WorldCore::Impl final : timeline::Arbiter {
   Closings closings_;
   HeldBack held_back_;
   bool begun_ = false;
-  bool idle_ = false;     // nothing can be done before something comes
-  bool holding_ = false;  // a step could be begun, with some patience better than now
-  Step told_early_ = -1;
+  bool idle_ = false;                               // nothing can be done before something comes
+  bool holding_ = false;                            // a step could be begun, with some patience better than now
+  Step told_early_ = -1;                            // the newest step that counts as told early
   bool untold_ = true;                              // something has changed since it was last looked at what to tell
   mutable std::optional<Step> front_, told_front_;  // as long as nothing changes
   Neighbourhood neighbourhood_;
