@@ -42,6 +42,7 @@ Topic transforms_topic();                      // Transforms
 Topic transfers_topic();                       // Transfer
 Topic lack_topic();                            // Lack
 Topic border_topic(WorldId from, WorldId to);  // Border
+Topic border_datagram_topic(WorldId to);       // Border, short ones
 
 // Reliable writers tell readers what there is this often while it is not acknowledged. 3 s by default: a reader that
 // lost something would take that long to find out.

@@ -50,8 +50,6 @@ void Link::send(Step upto, Step final_step, Step near_final, ActionNumber logged
   next_.clear();
 }
 
-void Link::interrupted() { ask_ = repeat_ = true; }
-
 void Link::collect(std::vector<std::vector<std::byte>>& out) {
   if (std::exchange(repeat_, false)) {
     out.insert(out.end(), log_.begin(), log_.end());

@@ -46,8 +46,10 @@ class Link {
   Step told_near_final() const { return told_near_final_; }
   // Closes the next message of the stream and appends it, as bytes, to `out`.
   void send(Step upto, Step final_step, Step near_final, ActionNumber logged, std::vector<std::vector<std::byte>>& out);
-  // Asks the peer for what is missing here, and repeats what it has not acknowledged, at the next collect().
-  void interrupted();
+  // Asks the peer for what is missing here, at the next collect().
+  void ask() { ask_ = true; }
+  // Also repeats what it has not acknowledged.
+  void interrupted() { ask_ = repeat_ = true; }
   // Appends requests and repetitions that are due.
   void collect(std::vector<std::vector<std::byte>>& out);
 

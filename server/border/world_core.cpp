@@ -88,6 +88,10 @@ class WorldCore::Impl final : timeline::Arbiter {
     return good;
   }
 
+  void ask(WorldId neighbour) {
+    if (Link* link = context_.link_to(neighbour)) link->ask();
+  }
+
   void reconnect(WorldId neighbour) {
     if (Link* link = context_.link_to(neighbour)) link->interrupted();
   }
@@ -469,6 +473,7 @@ WorldCore::WorldCore(physics::Model& model, const TerritoryMap& map, const CoreS
 WorldCore::~WorldCore() = default;
 bool WorldCore::receive(std::span<const std::byte> message) { return impl_->receive(message); }
 const std::string& WorldCore::last_refusal() const { return impl_->refusal_; }
+void WorldCore::ask(WorldId neighbour) { impl_->ask(neighbour); }
 void WorldCore::reconnect(WorldId neighbour) { impl_->reconnect(neighbour); }
 bool WorldCore::act(const LoggedAction& action) { return impl_->act(action); }
 void WorldCore::close_actions(Step step, ActionNumber logged) { impl_->close_actions(step, logged); }

@@ -128,8 +128,11 @@ class WorldCore {
   // changed (but for transfers that have been said along with what was refused).
   bool receive(std::span<const std::byte> message);
   const std::string& last_refusal() const;
-  // The connection with that neighbour was interrupted, or nothing has come for long: asks it for what is missing here
-  // and sends again what it has not acknowledged. Harmless at any time.
+  // Nothing has come from that neighbour for some time: asks it for what is missing here, if anything is. Harmless at
+  // any time.
+  void ask(WorldId neighbour);
+  // The connection with it was interrupted, or nothing has come for long: asks, and sends again what it has not
+  // acknowledged. Harmless likewise.
   void reconnect(WorldId neighbour);
   // The clock does not pass this step (pacing). By default there is no limit.
   void set_limit(Step newest);

@@ -22,9 +22,10 @@ constexpr auto kStatusEvery = 200ms;
 constexpr auto kStatusAtMost = 5ms;  // while a paced session waits for news of progress
 constexpr auto kIdleBehind = 4ms;    // where viewers are still to be told something
 constexpr auto kIdle = 20ms;         // longest sleep: reports and signals are looked after in between
-// A neighbour that is waited for and silent for that long is asked again what it has; then half as often each time,
-// because it may just be at a long step, and would be sent the same things again and again.
-constexpr auto kPatience = 500ms;
+// A neighbour that is waited for and silent for that long is asked for what has got lost; then half as often each time,
+// because it may just be at a long step. After a longer silence it is also sent again what it has not acknowledged.
+constexpr auto kPatience = 20ms;
+constexpr auto kLongSilence = 500ms;
 constexpr auto kPatienceMost = 4000ms;
 constexpr auto kFlushAtMost = 5s;  // for neighbours that have left already
 constexpr auto kFinishAtMost = 10s;
@@ -196,9 +197,12 @@ void Daemon::ask_the_silent(Clock::time_point now) {
     Line& from = lines_.at(neighbour);
     if (now - from.heard < from.patience) continue;
     spdlog::debug("nothing came from world {} for {:.1f} s; asking again", neighbour, seconds(from.patience));
+    if (from.patience < kLongSilence)
+      core_->ask(neighbour);
+    else
+      core_->reconnect(neighbour);
     from.heard = now;
     from.patience = std::min<Clock::duration>(2 * from.patience, kPatienceMost);
-    core_->reconnect(neighbour);
     asked = true;
   }
   if (asked) send_all();

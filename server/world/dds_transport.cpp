@@ -13,6 +13,9 @@ namespace {
 // After a write that failed: a stopped or dead reader has left the history full, and every further attempt would cost
 // the loop another wait. Longer than a heartbeat, so that a reader that lives has had the time to acknowledge.
 constexpr std::chrono::milliseconds kRetryAfter{150};
+// Longest payload that goes as a datagram, bytes. Of UDP's 64 KiB not all, because some of these come at once from
+// several neighbours, and what does not fit into the receiver's socket buffer is lost.
+constexpr std::size_t kDatagram = 32 * 1024;
 
 }  // namespace
 
@@ -20,38 +23,71 @@ struct DdsTransport::Link {
   WorldId id = 0;
   // Set on threads of DDS.
   std::atomic<bool> met_reader{false}, met_writer{false};  // ever
-  std::atomic<int> readers{0};  // that are there; a replacement may be found before its predecessor is given up
+  std::atomic<int> readers{0};       // that are there; a replacement may be found before its predecessor is given up
+  std::atomic<bool> just_met{true};  // nothing has been sent since
   bool reader_gone() const { return met_reader.load() && readers.load() <= 0; }
   // Of the daemon's thread.
-  bool missed = false;  // a message was dropped, and nobody has been told yet
+  bool missed = false;     // a message was dropped, and nobody has been told yet
+  bool long_ones = false;  // have been sent, and were not all acknowledged when last looked
   Clock::time_point retry_at{};
   wire::Border sample;
   // Last, so that no handler finds the rest gone.
+  std::unique_ptr<dds::Writer<wire::Border>> datagrams;
   std::unique_ptr<dds::Writer<wire::Border>> writer;
   std::unique_ptr<dds::Reader<wire::Border>> reader;
+
+  bool write() {
+    // The first reliably: whoever has just been met may not have met all of this world's writers.
+    if (!just_met.exchange(false) && sample.payload().size() <= kDatagram && may_be_datagram())
+      return datagrams->write(sample);
+    long_ones = true;
+    return writer->write(sample);
+  }
+  bool may_be_datagram() {
+    // Who has become a neighbour must have noticed.
+    if (readers.load() <= 0 || !datagrams->matched()) return false;
+    // Nor may it overtake what is under way: it would be taken for the end of a gap.
+    if (long_ones) long_ones = !writer->wait_acknowledged(std::chrono::milliseconds(0));
+    return !long_ones;
+  }
 };
 
 DdsTransport::DdsTransport(dds::Participant& participant, WorldId me) : participant_(participant), me_(me) {}
 DdsTransport::~DdsTransport() = default;
 
 void DdsTransport::open(std::span<const WorldId> neighbours) {
+  if (!datagrams_ && !neighbours.empty())
+    datagrams_ = std::make_unique<dds::Reader<wire::Border>>(
+        participant_, dds::border_datagram_topic(me_),
+        [this](wire::Border&& sample, const dds::WriterKey&) {
+          const WorldId from = sample.from();
+          came(from, std::move(sample));
+        },
+        [this](int change) {
+          datagram_writers_ += change;
+          inbox_.wake();
+        });
   for (const WorldId id : neighbours) {
     Link& link = *links_.emplace_back(std::make_unique<Link>());
     link.id = id;
     link.sample.from(me_);
     link.sample.to(id);
+    link.datagrams = std::make_unique<dds::Writer<wire::Border>>(participant_, dds::border_datagram_topic(id),
+                                                                 [this](int) { inbox_.wake(); });
     link.writer = std::make_unique<dds::Writer<wire::Border>>(
         participant_, dds::border_topic(me_, id), [this, &link](int change) { readers_changed(link, change); });
     link.reader = std::make_unique<dds::Reader<wire::Border>>(
         participant_, dds::border_topic(id, me_),
-        [this, &link](wire::Border&& sample, const dds::WriterKey&) { came(link, std::move(sample)); },
+        [this, id](wire::Border&& sample, const dds::WriterKey&) { came(id, std::move(sample)); },
         [this, &link](int change) { writers_changed(link, change); });
   }
 }
 
 bool DdsTransport::connected() const {
-  return std::all_of(links_.begin(), links_.end(),
-                     [](const auto& link) { return link->met_reader.load() && link->met_writer.load(); });
+  return datagram_writers_.load() >= std::ssize(links_) &&
+         std::all_of(links_.begin(), links_.end(), [](const auto& link) {
+           return link->met_reader.load() && link->met_writer.load() && link->datagrams->matched();
+         });
 }
 
 DdsTransport::Link* DdsTransport::find(WorldId neighbour) {
@@ -66,6 +102,7 @@ void DdsTransport::readers_changed(Link& link, int change) {
     if (left <= 0) spdlog::info("lost world {}", link.id);
     return;
   }
+  link.just_met.store(true);
   const bool again = link.met_reader.exchange(true);
   if (again) {
     spdlog::info("world {} is back", link.id);
@@ -84,12 +121,12 @@ void DdsTransport::writers_changed(Link& link, int change) {
     inbox_.wake();
 }
 
-void DdsTransport::came(const Link& link, wire::Border&& sample) {
-  if (sample.from() != link.id || sample.to() != me_) {
-    dds::refusals().add("border topic of world " + std::to_string(link.id), "it is not of this pair");
+void DdsTransport::came(WorldId from, wire::Border&& sample) {
+  if (sample.from() != from || sample.to() != me_) {
+    dds::refusals().add("border topic of world " + std::to_string(from), "it is not of this pair");
     return;
   }
-  Incoming incoming{Incoming::Kind::kMessage, link.id, std::vector<std::byte>(sample.payload().size())};
+  Incoming incoming{Incoming::Kind::kMessage, from, std::vector<std::byte>(sample.payload().size())};
   std::memcpy(incoming.bytes.data(), sample.payload().data(), incoming.bytes.size());
   inbox_.push(std::move(incoming));
 }
@@ -105,7 +142,7 @@ void DdsTransport::send(WorldId to, std::vector<std::byte> bytes) {
   if (try_now) {
     const auto* first = reinterpret_cast<const std::uint8_t*>(bytes.data());
     link->sample.payload().assign(first, first + bytes.size());
-    if (link->writer->write(link->sample)) return;
+    if (link->write()) return;
     link->retry_at = Clock::now() + kRetryAfter;
     spdlog::debug("world {} does not take what it is sent", to);
   }
@@ -114,7 +151,11 @@ void DdsTransport::send(WorldId to, std::vector<std::byte> bytes) {
 }
 
 std::optional<Incoming> DdsTransport::receive() {
-  if (auto incoming = inbox_.pop()) return incoming;
+  while (auto incoming = inbox_.pop()) {
+    if (find(incoming->from)) return incoming;
+    dds::refusals().add("border topic of world " + std::to_string(me_),
+                        "world " + std::to_string(incoming->from) + " is no neighbour");
+  }
   if (!any_missed_) return std::nullopt;
   const auto now = Clock::now();
   any_missed_ = false;

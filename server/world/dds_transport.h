@@ -1,6 +1,8 @@
-// Border messages over DDS: for each neighbour one writer and one reader, on topics of their own, so that nobody
-// receives what was meant for others. Order and numbering are the core's business; this only has to say honestly when a
-// message may have been lost.
+// Border messages over DDS: short ones as datagrams that may get lost, to a topic of each receiver; long ones, of which
+// DDS would seldom bring all fragments at the first go, and all while it has not brought these yet, reliably on a topic
+// of each ordered pair. So nobody receives what was meant for others, and order is mostly kept. Numbering, and asking
+// for what is missing, are the core's and the daemon's business; this says honestly when it knows that a message may
+// have been lost.
 #pragma once
 
 #include <atomic>
@@ -34,13 +36,16 @@ class DdsTransport final : public Transport {
   Link* find(WorldId neighbour);
   void readers_changed(Link& link, int change);  // of what we write
   void writers_changed(Link& link, int change);  // of what we read
-  void came(const Link& link, wire::Border&& sample);
+  void came(WorldId from, wire::Border&& sample);
 
   dds::Participant& participant_;
   const WorldId me_;
   Inbox inbox_;
-  bool any_missed_ = false;  // some link has missed a message
+  std::atomic<int> datagram_writers_{0};  // that have been met
+  bool any_missed_ = false;               // some link has missed a message
   std::vector<std::unique_ptr<Link>> links_;
+  // Last, so that no handler finds the rest gone.
+  std::unique_ptr<dds::Reader<wire::Border>> datagrams_;
 };
 
 }  // namespace soda::world

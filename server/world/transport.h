@@ -16,7 +16,7 @@ namespace soda::world {
 struct Incoming {
   enum class Kind {
     kMessage,      // `bytes` is a border message
-    kInterrupted,  // messages to or from `from` may have been lost (unmatched, matched again, write failed)
+    kInterrupted,  // many messages to or from `from` may have been lost (unmatched, matched again, write failed)
   };
   Kind kind = Kind::kMessage;
   WorldId from = 0;
@@ -30,15 +30,16 @@ class Transport {
   virtual void open(std::span<const WorldId> neighbours) = 0;
   // Whether every neighbour has been met that there is so far.
   virtual bool connected() const = 0;
-  // Hands a message over for sending, in order for each receiver; never blocks for long for the receiver's sake. What
-  // cannot be sent is dropped, and kInterrupted comes for that world once it is worth trying again.
+  // Hands a message over for sending; never blocks for long for the receiver's sake. What cannot be sent is dropped,
+  // and kInterrupted comes for that world once it is worth trying again. What is sent mostly arrives, and in order;
+  // that it did not is noticed by nobody but the receiver.
   virtual void send(WorldId to, std::vector<std::byte> bytes) = 0;
   // The next thing that came, if any.
   virtual std::optional<Incoming> receive() = 0;
   // Blocks until something has come, wake() was called, or the time is up.
   virtual void wait(std::chrono::steady_clock::duration at_most) = 0;
   virtual void wake() = 0;  // from any thread
-  // Blocks until what was sent has been acknowledged by its receivers, or the time is up. For the end of a run.
+  // Blocks until what can be acknowledged has been by its receivers, or the time is up. For the end of a run.
   virtual void flush(std::chrono::steady_clock::duration at_most) = 0;
 };
 

@@ -17,8 +17,10 @@ namespace soda::test {
 // One session's queues. Made first, destroyed last.
 class InProcessNetwork {
  public:
-  // `loss`: the share of messages that get lost; the receiver's end then reports an interruption, as DDS would.
-  explicit InProcessNetwork(WorldId worlds, double loss = 0, std::uint64_t seed = 1) : loss_(loss), random_(seed) {
+  // `loss`: the share of messages that get lost; both ends then report an interruption, as where DDS knows of it, or
+  // nobody does, as with a datagram.
+  explicit InProcessNetwork(WorldId worlds, double loss = 0, bool silent = false, std::uint64_t seed = 1)
+      : loss_(loss), silent_(silent), random_(seed) {
     for (WorldId i = 0; i < worlds; ++i) inboxes_.push_back(std::make_unique<world::Inbox>());
   }
 
@@ -26,6 +28,7 @@ class InProcessNetwork {
 
   void deliver(WorldId from, WorldId to, std::vector<std::byte> bytes) {
     if (lost()) {
+      if (silent_) return;
       inbox(to).push({world::Incoming::Kind::kInterrupted, from, {}});
       inbox(from).push({world::Incoming::Kind::kInterrupted, to, {}});
       return;
@@ -41,7 +44,8 @@ class InProcessNetwork {
   }
 
   std::vector<std::unique_ptr<world::Inbox>> inboxes_;
-  double loss_;
+  const double loss_;
+  const bool silent_;
   std::mutex mutex_;  // guards random_
   std::mt19937_64 random_;
 };

@@ -76,7 +76,7 @@ struct RunResult {
 };
 
 RunResult run(const Scene& scene, WorldId worlds, Step steps, double pace, double loss,
-              std::vector<WantedAction> actions = {}) {
+              std::vector<WantedAction> actions = {}, bool silent = false) {
   wire::Session session;
   session.protocol(kProtocolVersion);
   session.instance(1);
@@ -88,7 +88,7 @@ RunResult run(const Scene& scene, WorldId worlds, Step steps, double pace, doubl
   session.pace(pace);
 
   Ledger ledger;
-  test::InProcessNetwork network(worlds, loss);
+  test::InProcessNetwork network(worlds, loss, silent);
   std::unique_ptr<SessionService> service;
   std::vector<std::unique_ptr<test::InProcessTransport>> transports;
   std::vector<std::unique_ptr<LedgerReports>> reports;
@@ -174,6 +174,16 @@ TEST(DaemonThreads, LossesChangeNothing) {
   const RunResult lossy = run(scene, 3, kSteps, 0, 0.02);
   EXPECT_EQ(without_worlds(lossy.rows), without_worlds(one.rows));
   EXPECT_GT(lossy.interruptions, 0u);
+  EXPECT_GT(lossy.resent, 0u);
+}
+
+// Nobody is told that a datagram was lost: its number is missing, or who waits for it asks.
+TEST(DaemonThreads, LossesThatNobodyToldOfChangeNothing) {
+  const Scene scene = generate("heap", 200, 1);
+  const RunResult one = run(scene, 1, kSteps, 0, 0);
+  const RunResult lossy = run(scene, 3, kSteps, 0, 0.02, {}, true);
+  EXPECT_EQ(without_worlds(lossy.rows), without_worlds(one.rows));
+  EXPECT_EQ(lossy.interruptions, 0u);
   EXPECT_GT(lossy.resent, 0u);
 }
 
