@@ -145,6 +145,7 @@ void put_part(std::vector<std::byte>& out, const Part& part) {
   put(out, part.origin);
   put(out, part.step);
   put(out, part.revision);
+  put(out, static_cast<std::uint8_t>(part.whole));
   put(out, static_cast<std::uint32_t>(part.components.size()));
   for (const auto& component : part.components) {
     encode_set(component->set, out);
@@ -162,6 +163,7 @@ Part get_part(Reader& in, std::span<const std::byte>& rest, const physics::Model
   part.origin = in.get<WorldId>("part origin");
   part.step = in.get<Step>("part step");
   part.revision = in.get<Revision>("part revision");
+  part.whole = in.get<std::uint8_t>("part whole") != 0;
   part.components.resize(in.count(12, "part components"));
   for (auto& kept : part.components) {
     Component component;
@@ -294,6 +296,7 @@ void check(const Message& message, WorldId me, WorldId worlds) {
     if (part.origin >= worlds || part.origin == me)
       throw CodecError("part: origin " + std::to_string(part.origin) + " cannot be");
     for (const auto& component : part.components) {
+      if (!part.whole && component->set.bodies.empty()) throw CodecError("part: of its components one has no bodies");
       for (const Port& port : component->ports)
         if (port.owner >= worlds) throw CodecError("port: no world " + std::to_string(port.owner));
       check_ends(component->set, component->ports, false);

@@ -12,7 +12,7 @@
 
 namespace soda::border {
 
-constexpr std::uint32_t kCodecVersion = 4;
+constexpr std::uint32_t kCodecVersion = 5;
 
 // What was received is not a message: says which field and why.
 struct CodecError : std::runtime_error {

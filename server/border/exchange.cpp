@@ -17,7 +17,7 @@ void Exchange::refresh_part(WorldId me, std::uint32_t epoch, Step step) {
   std::sort(shared.begin(), shared.end(), [](const KeptIsland* l, const KeptIsland* r) {
     return first_body(*l->component) < first_body(*r->component);
   });
-  Part part{me, step, {}, {}};
+  Part part{me, step, {}, true, {}};
   std::uint64_t content = shared.size();
   for (std::uint32_t i = 0; i < shared.size(); ++i) {
     shared[i]->index = i;

@@ -49,9 +49,16 @@ struct Exchange {
   std::uint64_t part_content = 0;
   // By link: the revision of the part that it was told. (Not its content: one that has become again what it was may
   // have been told to others in between, who pass on that one, and word that it is final.)
-  std::vector<std::optional<std::uint32_t>> told;
+  struct Told {
+    std::uint32_t revision = 0;
+    bool whole = false;
+    bool operator==(const Told&) const = default;
+  };
+  std::vector<std::optional<Told>> told;
   struct Passed {
     Revision revision;
+    bool whole = false;
+    std::vector<BodyId> components;  // by their first bodies, where not whole
     bool final = false;
   };
   std::map<std::pair<WorldId, WorldId>, Passed> passed;  // (to, origin)

@@ -43,11 +43,13 @@ struct Component {
   std::vector<Port> ports;
 };
 
-// All components of a world that touch foreign bodies at a step. Components are shared with whoever else keeps them.
+// The components of a world that touch foreign bodies at a step: all, or those that concern the receiver. Each has
+// bodies, where they are not all. Components are shared with whoever else keeps them.
 struct Part {
   WorldId origin = 0;
   Step step = 0;
   Revision revision;
+  bool whole = true;
   std::vector<std::shared_ptr<const Component>> components;
 };
 

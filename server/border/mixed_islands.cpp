@@ -8,6 +8,13 @@
 #include "common/state_hash.h"
 
 namespace soda::border {
+namespace {
+
+bool contains(const std::vector<WorldId>& worlds, WorldId world) {
+  return std::find(worlds.begin(), worlds.end(), world) != worlds.end();
+}
+
+}  // namespace
 
 std::uint64_t component_hash(const Component& component) {
   std::uint64_t hash = full_hash(component.set);
@@ -17,29 +24,51 @@ std::uint64_t component_hash(const Component& component) {
   return hash;
 }
 
-bool MixedIslands::put(Part part) {
-  const WorldId origin = part.origin;
-  const auto old = parts_.find(origin);
-  if (old != parts_.end() && part.revision <= old->second.part.revision) return false;
-  Indexed indexed;
-  for (std::uint32_t i = 0; i < part.components.size(); ++i) {
-    const Component& component = *part.components[i];
-    indexed.hashes.push_back(component_hash(component));
-    for (const BodyState& body : component.set.bodies) indexed.holder.emplace_back(body.id, i);
-    std::vector<WorldId>& touched = indexed.touched.emplace_back();
-    for (const Port& port : component.ports) {
-      indexed.port_users.emplace_back(port.body, i);
-      if (std::find(touched.begin(), touched.end(), port.owner) == touched.end()) touched.push_back(port.owner);
-    }
-    indexed.touched_by_any.insert(indexed.touched_by_any.end(), touched.begin(), touched.end());
+void MixedIslands::Indexed::add(std::shared_ptr<const Component> component) {
+  const auto i = static_cast<std::uint32_t>(part.components.size());
+  hashes.push_back(component_hash(*component));
+  for (const BodyState& body : component->set.bodies) holder.emplace_back(body.id, i);
+  std::vector<WorldId>& of = touched.emplace_back();
+  for (const Port& port : component->ports) {
+    port_users.emplace_back(port.body, i);
+    if (!contains(of, port.owner)) of.push_back(port.owner);
   }
-  std::sort(indexed.holder.begin(), indexed.holder.end());
-  std::sort(indexed.port_users.begin(), indexed.port_users.end());
-  std::vector<WorldId>& any = indexed.touched_by_any;
-  std::sort(any.begin(), any.end());
-  any.erase(std::unique(any.begin(), any.end()), any.end());
-  indexed.part = std::move(part);
-  parts_.insert_or_assign(origin, std::move(indexed));
+  touched_by_any.insert(touched_by_any.end(), of.begin(), of.end());
+  part.components.push_back(std::move(component));
+}
+
+void MixedIslands::Indexed::sort() {
+  std::sort(holder.begin(), holder.end());
+  std::sort(port_users.begin(), port_users.end());
+  std::sort(touched_by_any.begin(), touched_by_any.end());
+  touched_by_any.erase(std::unique(touched_by_any.begin(), touched_by_any.end()), touched_by_any.end());
+}
+
+bool MixedIslands::Indexed::has(BodyId body) const {
+  const auto at = std::lower_bound(holder.begin(), holder.end(), std::pair(body, 0u));
+  return at != holder.end() && at->first == body;
+}
+
+bool MixedIslands::put(Part part) {
+  const auto old = parts_.find(part.origin);
+  Indexed fresh;
+  Indexed* into = &fresh;
+  if (old != parts_.end()) {
+    const Part& known = old->second.part;
+    if (part.revision < known.revision || (part.revision == known.revision && known.whole)) return false;
+    if (part.revision == known.revision && !part.whole) into = &old->second;
+  }
+  const auto components = std::exchange(part.components, {});
+  if (into == &fresh) into->part = std::move(part);
+  const std::size_t before = into->part.components.size();
+  for (const auto& component : components) {
+    if (into != &fresh && into->has(component->set.bodies.front().id)) continue;
+    into->add(component);
+    if (into != &fresh) into->sort();
+  }
+  if (into != &fresh && into->part.components.size() == before) return false;
+  into->sort();
+  if (into == &fresh) parts_.insert_or_assign(fresh.part.origin, std::move(fresh));
   return true;
 }
 
@@ -81,6 +110,10 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
       if (!part) continue;
       const auto holder = std::lower_bound(part->holder.begin(), part->holder.end(), std::pair(port.body, 0u));
       if (holder == part->holder.end() || holder->first != port.body) {
+        if (!part->part.whole) {  // yet to be passed on
+          missing.insert(port.owner);
+          continue;
+        }
         misfit(port.owner, "world " + std::to_string(key.origin) + " touches body " + std::to_string(port.body) +
                                ", but its owner " + std::to_string(port.owner) + " does not say so");
         continue;
@@ -100,6 +133,7 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
       neighbourhood_->reached(body, step_, reached);
       for (const WorldId world : reached)
         if (const Indexed* part = part_of(world)) {
+          if (!part->part.whole) missing.insert(world);
           const auto& users = part->port_users;
           for (auto it = std::lower_bound(users.begin(), users.end(), std::pair(body.id, 0u));
                it != users.end() && it->first == body.id; ++it)
@@ -122,12 +156,30 @@ bool MixedIslands::touches(WorldId world, WorldId other) const {
 bool MixedIslands::touches_both(const Closure& island, WorldId world, WorldId one, WorldId other) const {
   const auto it = parts_.find(world);
   if (it == parts_.end()) return false;
-  const auto has = [](const std::vector<WorldId>& worlds, WorldId w) {
-    return std::find(worlds.begin(), worlds.end(), w) != worlds.end();
-  };
   for (auto key = std::lower_bound(island.components.begin(), island.components.end(), Key{world, 0});
        key != island.components.end() && key->origin == world; ++key)
-    if (const auto& touched = it->second.touched[key->component]; has(touched, one) && has(touched, other)) return true;
+    if (const auto& touched = it->second.touched[key->component]; contains(touched, one) && contains(touched, other))
+      return true;
+  return false;
+}
+
+bool MixedIslands::touches(Key component, WorldId other) const {
+  return contains(parts_.at(component.origin).touched[component.component], other);
+}
+
+bool MixedIslands::leads_over(const Closure& island, Key component, WorldId between, WorldId other) const {
+  const auto it = parts_.find(between);
+  if (it == parts_.end() || !touches(component, between)) return false;
+  const Indexed& origin = parts_.at(component.origin);
+  const auto touches_it = [&](const Port& port) {
+    const auto holder = std::lower_bound(origin.holder.begin(), origin.holder.end(), std::pair(port.body, 0u));
+    return holder != origin.holder.end() && holder->first == port.body && holder->second == component.component;
+  };
+  for (auto key = std::lower_bound(island.components.begin(), island.components.end(), Key{between, 0});
+       key != island.components.end() && key->origin == between; ++key) {
+    const std::vector<Port>& ports = it->second.part.components[key->component]->ports;
+    if (touches(*key, other) && std::any_of(ports.begin(), ports.end(), touches_it)) return true;
+  }
   return false;
 }
 

@@ -4,10 +4,15 @@
 // as a port; a wide body leads to every component that has it as a port, so every world that it reaches must have told
 // its part, if only to say that nothing touches it there. An island is closed when nothing that is led to is missing,
 // lacks a body, or holds another record of it.
+//
+// A part may have come without the components that do not concern this world (Part::whole): those that an island leads
+// to nevertheless are still to come, from whoever passes them on. What leads to nothing would not be missed, so where
+// there is a wide body whole parts are needed.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -41,7 +46,8 @@ class MixedIslands {
     std::string misfit;            // what does not fit, if anything
   };
 
-  // Takes a part, in place of an older one of that origin; false where it is not newer.
+  // Takes a part, in place of an older one of that origin, or together with what there is of the same revision; false
+  // where nothing is new.
   bool put(Part part);
   const Part* find(WorldId origin) const;
   template <typename F>
@@ -56,6 +62,10 @@ class MixedIslands {
   bool touches(WorldId world, WorldId other) const;
   // Whether one of its components in `island` touches bodies of both.
   bool touches_both(const Closure& island, WorldId world, WorldId one, WorldId other) const;
+  // The same of one component: whether it touches a body of `other`; and whether `between` has a component in `island`
+  // that it touches, and which touches a body of `other`.
+  bool touches(Key component, WorldId other) const;
+  bool leads_over(const Closure& island, Key component, WorldId between, WorldId other) const;
 
   // Bodies and contacts of all components of a closed island; nothing where two worlds' do not fit together, which
   // `misfit` then tells.
@@ -63,6 +73,9 @@ class MixedIslands {
 
  private:
   struct Indexed {
+    void add(std::shared_ptr<const Component> component);  // unless it is there
+    void sort();
+    bool has(BodyId body) const;
     Part part;
     using InComponent = std::pair<BodyId, std::uint32_t>;
     std::vector<std::uint64_t> hashes;          // by component

@@ -260,7 +260,8 @@ bool Settler::try_shared(Step step, KeptIsland& island, const std::function<void
 
 // ---- what is told
 
-// What is used here of other worlds goes on to those that share the island, so that all parts reach all its worlds.
+// What is used here of other worlds, and of this one without touching them, goes on to those that share the island, so
+// that all its parts reach all its worlds.
 void Settler::pass_on(Step step, const MixedIslands::Closure& closure) {
   if (closure.worlds.size() + closure.missing.size() <= 2) return;
   Exchange& exchange = at(step);
@@ -272,74 +273,118 @@ void Settler::pass_on(Step step, const MixedIslands::Closure& closure) {
   relays_.clear();
   for (const WorldId world : closure.worlds)
     if (world < me && exchange.parts.touches(me, world) && exchange.parts.touches(world, me)) relays_.push_back(world);
-  for (const WorldId to : hearers(step)) {
+  for (const WorldId to : hearers(step).worlds) {
     Link* const link = context_.link_to(to);
     if (!link || !shares(to)) continue;
     for (const WorldId origin : closure.worlds) {
-      if (origin == me || origin == to) continue;
+      if (origin == to) continue;
       const Part& part = *exchange.parts.find(origin);
-      const auto passed = exchange.passed.find({to, origin});
-      if (passed != exchange.passed.end() && passed->second.revision == part.revision) continue;
-      if (is_told_otherwise(step, closure, origin, to)) {
-        ++context_.stats.parts_left;
+      const auto known = exchange.passed.find({to, origin});
+      const bool begun = known != exchange.passed.end() && known->second.revision == part.revision;
+      if (begun && known->second.whole) continue;
+      if (origin == me && exchange.told[link->index()] == Exchange::Told{part.revision.count, true}) continue;
+      Part rest = left_to_pass(step, closure, origin, to, begun ? &known->second : nullptr);
+      if (!rest.whole && rest.components.empty()) {
+        context_.stats.parts_left += origin != me && !begun;
         continue;
       }
-      exchange.passed.insert_or_assign({to, origin}, Exchange::Passed{part.revision, false});
+      Exchange::Passed& passed = exchange.passed[{to, origin}];
+      if (!begun) passed = {part.revision, false, {}, false};
+      passed.whole = rest.whole;
+      passed.final = origin == me;  // which is told otherwise
+      if (!rest.whole)
+        for (const auto& component : rest.components) passed.components.push_back(component->set.bodies.front().id);
       exchange.finals_due = true;
-      link->add(part);
+      link->add(std::move(rest));
       ++context_.stats.parts_sent;
-      ++context_.stats.parts_passed;
+      context_.stats.parts_passed += origin != me;
     }
   }
 }
 
-// Whether `to` gets that part without this world: of its origin, or of one with a lower number that touches bodies of
-// both with one component, and so passes it on as soon as it has it. Only of who touches bodies of this world, and
-// tells it its part itself, is that certain: what others pass on of a part may be old. So, where those between touch
-// each other, each part comes once to each world that is two components away, and a chain of them passes every part on
-// along itself.
-bool Settler::is_told_otherwise(Step step, const MixedIslands::Closure& closure, WorldId origin, WorldId to) const {
+// What of a part, or whether a whole one, `to` does not get without this world: of its origin, or of one with a lower
+// number that touches bodies of both with one component, and so passes it on as soon as it has it. Only of who touches
+// bodies of this world, and tells it its part itself, is that certain: what others pass on of a part may be old. So,
+// where those between touch each other, each component comes once to each world that is two components away, and a
+// chain of them passes each on along itself.
+Part Settler::left_to_pass(Step step, const MixedIslands::Closure& closure, WorldId origin, WorldId to,
+                           const Exchange::Passed* passed) const {
   const MixedIslands& parts = at(step).parts;
-  return parts.touches(origin, to) || std::any_of(relays_.begin(), relays_.end(), [&](WorldId between) {
-           return between != origin && between != to && parts.touches(origin, between) &&
-                  parts.touches_both(closure, between, origin, to);
-         });
+  const Part& part = *parts.find(origin);
+  Part rest{origin, step, part.revision, false, {}};
+  const auto some_relay = [&](const auto& passes_on) {
+    return std::any_of(relays_.begin(), relays_.end(),
+                       [&](WorldId between) { return between != origin && between != to && passes_on(between); });
+  };
+  if (part.whole && origin != context_.settings.me) {
+    const bool otherwise = parts.touches(origin, to) || some_relay([&](WorldId between) {
+                             return parts.touches(origin, between) && parts.touches_both(closure, between, origin, to);
+                           });
+    return otherwise ? rest : part;
+  }
+  using Key = MixedIslands::Key;
+  for (auto key = std::lower_bound(closure.components.begin(), closure.components.end(), Key{origin, 0});
+       key != closure.components.end() && key->origin == origin; ++key) {
+    const auto& component = part.components[key->component];
+    if (component->set.bodies.empty()) continue;  // of wide bodies alone: this world's part will be told whole
+    const BodyId first = component->set.bodies.front().id;
+    if (passed && std::find(passed->components.begin(), passed->components.end(), first) != passed->components.end())
+      continue;
+    if (parts.touches(*key, to) ||
+        some_relay([&](WorldId between) { return parts.leads_over(closure, *key, between, to); }))
+      continue;
+    rest.components.push_back(component);
+  }
+  return rest;
 }
 
-std::set<WorldId> Settler::hearers(Step step) const {
-  std::set<WorldId> worlds;
+Settler::Hearers Settler::hearers(Step step) const {
+  Hearers to;
+  std::set<WorldId>& worlds = to.worlds;
   std::vector<WorldId> reached;
   for (const KeptIsland& island : at(step).kept) {
     if (!island.shared) continue;
     for (const Port& port : island.component->ports) worlds.insert(port.owner);
     for (const BodyState& body : island.component->set.bodies) {
       if (!context_.neighbourhood.is_wide(body)) continue;
+      to.whole = true;
       context_.neighbourhood.reached(body, step, reached);  // whoever it reaches must say what touches it there
       worlds.insert(reached.begin(), reached.end());
     }
   }
   context_.timeline.for_each_foreign_wide(step, [&](timeline::Slot, const timeline::Record& record) {
+    to.whole = true;
     context_.neighbourhood.reached(record.body, step, reached);
     if (std::binary_search(reached.begin(), reached.end(), context_.settings.me)) worlds.insert(record.place.owner);
   });
   worlds.erase(context_.settings.me);
-  return worlds;
+  return to;
 }
 
 void Settler::tell(Step step) {
   Exchange& exchange = at(step);
   if (std::exchange(exchange.part_due, false)) {
     exchange.refresh_part(context_.settings.me, context_.settings.epoch, step);
-    const std::set<WorldId> to = hearers(step);
-    for (const WorldId world : to)
+    const Hearers to = hearers(step);
+    for (const WorldId world : to.worlds)
       if (!context_.link_to(world))
         throw ProtocolError("step " + std::to_string(step) + ": an island reaches world " + std::to_string(world) +
                             ", which is no neighbour");
+    const Part& mine = *exchange.parts.find(context_.settings.me);
     for (std::size_t l = 0; l < context_.links.size(); ++l) {
-      std::optional<std::uint32_t>& told = exchange.told[l];
-      if (told ? *told == exchange.revisions : !to.contains(context_.links[l].peer())) continue;
-      told = exchange.revisions;
-      context_.links[l].add(*exchange.parts.find(context_.settings.me));
+      Link& link = context_.links[l];
+      std::optional<Exchange::Told>& told = exchange.told[l];
+      if (told ? told->revision == exchange.revisions && (told->whole || !to.whole) : !to.worlds.contains(link.peer()))
+        continue;
+      told = {exchange.revisions, to.whole};
+      Part part = mine;
+      part.whole = to.whole;
+      if (!part.whole)
+        std::erase_if(part.components, [&](const auto& component) {
+          return std::none_of(component->ports.begin(), component->ports.end(),
+                              [&](const Port& port) { return port.owner == link.peer(); });
+        });
+      link.add(std::move(part));
       ++context_.stats.parts_sent;
     }
   }

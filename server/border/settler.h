@@ -82,8 +82,14 @@ class Settler {
   BodySet solve(BodySet island);
   bool part_is_final(Step step, WorldId origin) const;
   void pass_on(Step step, const MixedIslands::Closure& closure);
-  bool is_told_otherwise(Step step, const MixedIslands::Closure& closure, WorldId origin, WorldId to) const;
-  std::set<WorldId> hearers(Step step) const;
+  Part left_to_pass(Step step, const MixedIslands::Closure& closure, WorldId origin, WorldId to,
+                    const Exchange::Passed* passed) const;
+  // Whom this world's part concerns.
+  struct Hearers {
+    std::set<WorldId> worlds;
+    bool whole = false;  // there are wide bodies: all of it concerns each of them
+  };
+  Hearers hearers(Step step) const;
 
   const Context& context_;
   std::deque<Exchange> exchanges_;

@@ -222,6 +222,12 @@ TEST_F(Messages, OfOthersChangeNothing) {
   bad = hello;
   bad.parts = {{.origin = 9, .step = 0, .revision = {}, .components = {}}};
   EXPECT_NE(refusal(bad).find("origin 9"), std::string::npos);
+  bad.parts = {{.origin = 1,
+                .step = 0,
+                .revision = {},
+                .whole = false,
+                .components = {std::make_shared<const border::Component>()}}};
+  EXPECT_NE(refusal(bad).find("no bodies"), std::string::npos);
   bad = hello;
   bad.header.sequence = 1;
   bad.header.upto = 3;
@@ -236,7 +242,7 @@ TEST_F(Messages, OfOthersChangeNothing) {
   bad = hello;
   bad.header.sequence = 1u << 20;
   EXPECT_NE(refusal(bad).find("too far ahead"), std::string::npos);
-  EXPECT_EQ(world.stats().refused, 8u);
+  EXPECT_EQ(world.stats().refused, 9u);
   // None of them has spoilt the stream, or the sender's epoch.
   hello.header.sequence = 1;
   hello.header.epoch = 9;
