@@ -12,6 +12,15 @@
 
 namespace soda::bench {
 
+double CostBySize::operator()(std::size_t bytes) const {
+  const auto size = static_cast<double>(bytes);
+  if (known_.size() == 1) return known_.front().seconds;
+  std::size_t i = 1;
+  while (i + 1 < known_.size() && known_[i].bytes < size) ++i;
+  const Known &low = known_[i - 1], &high = known_[i];
+  return low.seconds + (high.seconds - low.seconds) * (size - low.bytes) / (high.bytes - low.bytes);
+}
+
 Yardstick::Yardstick() : model_(generate("piles", 324, 1)), stepper_(model_), start_(model_.initial_state()) {
   for (int i = 0; i < 30; ++i) stepper_.step(start_);
   at_first_ = seconds();
@@ -118,7 +127,7 @@ Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, balance::Balance
   double network = 0;
   for (const auto& bytes : piece.messages) {
     if (!core.receive(bytes)) throw std::runtime_error(core.last_refusal());
-    network += network_.receive_seconds + network_.receive_seconds_per_byte * static_cast<double>(bytes.size());
+    network += network_.receive(bytes.size());
   }
   measure(Activity::kReceiving);
   done.progress = core.work(piece.patient);
@@ -129,8 +138,7 @@ Cluster::Done Cluster::work(WorldId w, border::WorldCore& core, balance::Balance
   }
   done.out = core.take_outgoing();
   measure(Activity::kTelling);
-  for (const border::Outgoing& message : done.out)
-    network += network_.send_seconds + network_.send_seconds_per_byte * static_cast<double>(message.bytes.size());
+  for (const border::Outgoing& message : done.out) network += network_.send(message.bytes.size());
   spend(Activity::kNetwork, network);
   usage.pieces += done.progress == border::Progress::kWorked;
   return done;

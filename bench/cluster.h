@@ -12,6 +12,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/territory.h"
@@ -22,12 +23,25 @@
 
 namespace soda::bench {
 
-// What a message costs, between any two machines.
+// What a message costs by its size: along straight lines between what is known, and beyond.
+class CostBySize {
+ public:
+  CostBySize(double seconds = 0) : known_{{0, seconds}} {}  // NOLINT: the same for all
+  struct Known {
+    double bytes, seconds;
+  };
+  explicit CostBySize(std::vector<Known> known) : known_(std::move(known)) {}  // by size, ascending; not empty
+  double operator()(std::size_t bytes) const;                                 // s
+
+ private:
+  std::vector<Known> known_;
+};
+
+// What messages cost, between any two machines.
 struct Network {
-  double latency = 0;                                              // s, from a machine to another
-  double bytes_per_second = std::numeric_limits<double>::max();    // that leave a machine, one message after another
-  double send_seconds = 0, receive_seconds = 0;                    // of the processor, for a message
-  double send_seconds_per_byte = 0, receive_seconds_per_byte = 0;  // and for each of its bytes
+  double latency = 0;                                            // s, from a machine to another
+  double bytes_per_second = std::numeric_limits<double>::max();  // that leave a machine, one message after another
+  CostBySize send{}, receive{};                                  // of the processor
 };
 
 enum class Activity { kReceiving, kWorking, kTelling, kNetwork };  // the last: handing over to the network and back

@@ -27,7 +27,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr std::size_t kSizes[] = {128, 2048, 16384, 65536};  // bytes: an empty message, and what borders send
+// Bytes: an empty message, what borders send, and what DDS sends in fragments.
+constexpr std::size_t kSizes[] = {128, 2048, 8192, 30000, 131072};
 constexpr std::size_t kFarewell = 1;
 constexpr int kRounds = 7;
 constexpr int kBurst = 8;  // messages at once: a world tells its neighbours what it has computed
@@ -112,12 +113,6 @@ Sample measure(End& end, std::size_t bytes, int burst, int bursts) {
   return {static_cast<double>(bytes), median(round_trips) / 2, median(sending) / burst, median(receiving) / burst};
 }
 
-// The line through the smallest and the largest message: what is in between lies below it.
-void fit(double Sample::*cost, const Sample& small, const Sample& large, double& at_zero, double& per_byte) {
-  per_byte = std::max(0.0, (large.*cost - small.*cost) / (large.bytes - small.bytes));
-  at_zero = small.*cost - per_byte * small.bytes;
-}
-
 }  // namespace
 
 Network measure_messages(bool quick) {
@@ -165,12 +160,17 @@ Network measure_messages(bool quick) {
   }
   for (const Sample& s : samples)
     std::printf(
-        "a message of %5.0f bytes over DDS, UDP: %3.0f us on its way; CPU %3.0f us to send, %3.0f us to receive\n",
+        "a message of %6.0f bytes over DDS, UDP: %3.0f us on its way; CPU %3.0f us to send, %3.0f us to receive\n",
         s.bytes, 1e6 * s.one_way, 1e6 * s.send, 1e6 * s.receive);
   Network network;
   network.latency = samples.front().one_way;
-  fit(&Sample::send, samples.front(), samples.back(), network.send_seconds, network.send_seconds_per_byte);
-  fit(&Sample::receive, samples.front(), samples.back(), network.receive_seconds, network.receive_seconds_per_byte);
+  std::vector<CostBySize::Known> send, receive;
+  for (const Sample& s : samples) {
+    send.push_back({s.bytes, s.send});
+    receive.push_back({s.bytes, s.receive});
+  }
+  network.send = CostBySize(std::move(send));
+  network.receive = CostBySize(std::move(receive));
   return network;
 }
 

@@ -26,6 +26,17 @@ struct Weight {
   std::uint32_t cost;
 };
 constexpr std::uint32_t kDynamicCost = 8, kStaticCost = 1;  // of a body; of a static one in each cell that it lies in
+// What a body costs the world on the other side of a border, which hears of it, over what it costs its own, in eighths:
+// in the half cell at the border, and in the next, from which only larger ones reach so far.
+constexpr std::uint32_t kHeard = 3, kHeardOfSome = 1;
+// By where it is along the axis across a border at cell `at`, in half cells: what those below it hear of it, and those
+// above it. In eighths of its cost.
+constexpr std::uint32_t heard_below(std::int32_t where, std::int32_t at) {
+  return where == 2 * at ? kHeard : where == 2 * at + 1 ? kHeardOfSome : 0;
+}
+constexpr std::uint32_t heard_above(std::int32_t where, std::int32_t at) {
+  return where == 2 * at - 1 ? kHeard : where == 2 * at - 2 ? kHeardOfSome : 0;
+}
 constexpr double kMostBorderShare = 0.125;  // of a world's own work: what one side of its territory may count
 constexpr double kLargeStatic = 64;         // cells: what lies in more is everywhere
 
@@ -59,9 +70,8 @@ class Bisector {
   Bisector(const Grid& grid, int last_axis, bool straight, double border, std::vector<WorldId>& owner)
       : grid_(grid), last_axis_(last_axis), straight_(straight), border_(border), owner_(owner) {}
 
-  // Gives world `first`'s cells, which are in `region` with `weights`, to `count` worlds from it on. Reorders the
-  // weights. False: it has cut itself off from a way to give each world a cell.
-  bool split(const Region& region, std::span<Weight> weights, WorldId first, WorldId count) {
+  // Gives world `first`'s cells, which are in `region` with `weights`, to `count` worlds from it on. False: it has cut itself off from a way to give each world a cell.
+  bool split(const Region& region, std::span<const Weight> weights, WorldId first, WorldId count) {
     if (count == 1) return true;
     const WorldId lower = count / 2, second = first + lower;
     const std::optional<Cut> found = best_cut(region, weights, first, lower, count);
@@ -74,10 +84,26 @@ class Bisector {
       if (owner(c) == first) owner(c) = second;
     });
     if (!straight_) even_out(cut, weights, {first, lower}, {second, count - lower}, below, above);
-    const auto middle =
-        std::partition(weights.begin(), weights.end(), [&](const Weight& w) { return owner(cell_of(w)) == first; });
-    return split(below, {weights.begin(), middle}, first, lower) &&
-           split(above, {middle, weights.end()}, second, count - lower);
+    std::vector<Weight> below_weights, above_weights;
+    const auto axis = static_cast<std::size_t>(cut.axis);
+    for (const Weight& w : weights) {
+      const WorldId here = owner(cell_of(w));
+      (here == first ? below_weights : above_weights).push_back(w);
+      if (border_ == 0) continue;
+      for (const int way : {-1, 1}) {
+        Cell next = cell_of(w);
+        next[axis] += way;
+        if (next[axis] < region.low[axis] || next[axis] >= region.high[axis]) continue;
+        const WorldId there = owner(next);
+        if (there == here || (there != first && there != second)) continue;
+        Weight heard = w;
+        heard.at[axis] = 2 * next[axis] + (way < 0);
+        heard.cost = w.cost *
+                     (way < 0 ? heard_below(w.at[axis], next[axis] + 1) : heard_above(w.at[axis], next[axis])) / 8;
+        if (heard.cost > 0) (there == first ? below_weights : above_weights).push_back(heard);
+      }
+    }
+    return split(below, below_weights, first, lower) && split(above, above_weights, second, count - lower);
   }
 
   // Whether each world has cells, in one piece by faces.
@@ -165,7 +191,6 @@ class Bisector {
         total += w.cost;
       }
       const std::size_t face = all_cells / length;
-      const std::int64_t wanted = wanted_below(region, axis, total, lower, count);
       std::uint64_t below = 0;
       std::size_t cells_below = 0;
       for (std::int32_t i = 1; i < length; ++i) {
@@ -173,7 +198,12 @@ class Bisector {
         cells_below += cells[axis][i - 1];
         // Each side must have a cell for each of its worlds.
         if (cells_below < lower || all_cells - cells_below < count - lower) continue;
-        const std::int64_t misplaced = static_cast<std::int64_t>(below) - wanted;
+        const std::uint64_t heard_low = border_ == 0 ? 0 : (kHeard * slice[2 * i] + kHeardOfSome * slice[2 * i + 1]) / 8,
+                            heard_high =
+                                border_ == 0 ? 0 : (kHeard * slice[2 * i - 1] + kHeardOfSome * slice[2 * i - 2]) / 8;
+        const std::int64_t misplaced =
+            static_cast<std::int64_t>(below + heard_low) -
+            wanted_below(region, axis, total + heard_low + heard_high, lower, count);
         const std::uint64_t near = slice[2 * i - 1] + slice[2 * i];
         const auto uneven = static_cast<std::uint64_t>(std::abs(2 * static_cast<std::int64_t>(i) - length));
         const std::tuple cost{axis == last_axis_, 4 * static_cast<std::uint64_t>(std::abs(misplaced)) + near,
@@ -207,6 +237,7 @@ class Bisector {
     struct Row {
       std::size_t cells = 0;
       std::int64_t work = 0, near_here = 0, near_there = 0;
+      std::int64_t more_heard_low = 0, more_heard_high = 0;  // by each side if the row goes over, in eighths
       std::int64_t near_begin = 0, near_end = 0;  // in the slice, near the row's two ends
     };
     const auto count = static_cast<std::size_t>(region.high[along] - region.low[along]);
@@ -221,6 +252,12 @@ class Bisector {
       };
       if (is_near(cut.at)) row.near_here += w.cost;
       if (is_near(there)) row.near_there += w.cost;
+      if (border_ > 0) {
+        const std::int64_t cost = w.cost, where = w.at[axis];
+        const auto p = static_cast<std::int32_t>(where);
+        row.more_heard_low += cost * (static_cast<int>(heard_below(p, there)) - static_cast<int>(heard_below(p, cut.at)));
+        row.more_heard_high += cost * (static_cast<int>(heard_above(p, there)) - static_cast<int>(heard_above(p, cut.at)));
+      }
       if (cell_of(w)[axis] != slice || owner(cell_of(w)) != giver.first) continue;
       row.work += w.cost;
       (w.at[along] % 2 == 0 ? row.near_begin : row.near_end) += w.cost;
@@ -237,17 +274,18 @@ class Bisector {
     std::size_t most = 0;
     bool from_end = false;
     for (const bool backwards : {false, true}) {
-      std::int64_t left = std::abs(cut.misplaced), near = near_straight;
+      std::int64_t misplaced = cut.misplaced, near = near_straight;
       std::size_t cells = 0;
       for (std::size_t n = 1; n < count; ++n) {
         const Row &row = rows[backwards ? count - n : n - 1], &next = rows[backwards ? count - n - 1 : n];
         cells += row.cells;
         if (cells > may_go) break;
-        left -= row.work;
+        misplaced += down ? -row.work : row.work;
+        misplaced += (row.more_heard_low * high.worlds - row.more_heard_high * low.worlds) / (low.worlds + high.worlds) / 8;
         near += row.near_there - row.near_here;
         const std::int64_t end = backwards ? row.near_begin + next.near_end : row.near_end + next.near_begin;
-        if (4 * std::abs(left) + near + end < best)
-          best = 4 * std::abs(left) + near + end, most = n, from_end = backwards;
+        if (4 * std::abs(misplaced) + near + end < best)
+          best = 4 * std::abs(misplaced) + near + end, most = n, from_end = backwards;
       }
     }
     if (most == 0) return;
@@ -301,8 +339,7 @@ TerritoryMap bisect(const Scene& scene, const Grid& grid, WorldId worlds, double
   for (const Way& way : {Way{false, border_bodies}, Way{true, border_bodies}, Way{true, 0}}) {
     TerritoryMap map{grid, worlds, std::vector<WorldId>(grid.cells(), 0)};
     Bisector bisector(grid, axis_of_gravity(scene.gravity), way.straight, way.border_bodies * kDynamicCost, map.owner);
-    std::vector<Weight> some = weights;
-    if (bisector.split({{0, 0, 0}, grid.size, 0}, some, 0, worlds) && bisector.all_connected(worlds)) return map;
+    if (bisector.split({{0, 0, 0}, grid.size, 0}, weights, 0, worlds) && bisector.all_connected(worlds)) return map;
   }
   throw std::invalid_argument(
       "territories: fewer cells than worlds in a part of the grid; use fewer worlds (--worlds)");

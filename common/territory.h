@@ -19,7 +19,7 @@ struct TerritoryMap {
 // What a side of a territory behind which there are others costs, as so many bodies: messages, and their bodies near
 // the border. Measured with 1,000 bodies per world and 8 neighbours around it (docs/experiments.md). At most an eighth
 // of a world's mean work is counted for it.
-constexpr double kBorderBodies = 110;
+constexpr double kBorderBodies = 57;
 
 // Recursive bisection of the grid, weighted by what its cells will cost: connected territories with about the same work
 // each, cut where few bodies are, and upright; boxes of cells but for a part of a row at their ends where that makes

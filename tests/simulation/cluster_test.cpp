@@ -67,6 +67,17 @@ class ModelOfACluster : public testing::Test {
   std::unique_ptr<Cluster> cluster_;
 };
 
+TEST(CostOfAMessage, LiesBetweenWhatIsKnown) {
+  const CostBySize cost(std::vector<CostBySize::Known>{{100, 1}, {300, 2}, {400, 4}});
+  EXPECT_EQ(cost(100), 1);
+  EXPECT_EQ(cost(200), 1.5);
+  EXPECT_EQ(cost(300), 2);
+  EXPECT_EQ(cost(350), 3);
+  EXPECT_EQ(cost(500), 6) << "as between the last two";
+  EXPECT_EQ(cost(0), 0.5);
+  EXPECT_EQ(CostBySize(3)(1000), 3);
+}
+
 TEST_F(ModelOfACluster, AWorldAloneTakesWhatItsWorkTakes) {
   EXPECT_EQ(run(1, border::Sync::kConservative, {}), kSteps * kBodies * kEach);
   EXPECT_EQ(cluster_->usage(0).busy(), kSteps * kBodies * kEach);
@@ -99,7 +110,7 @@ TEST_F(ModelOfACluster, LatencyCostsThoseWhoWait) {
 
 TEST_F(ModelOfACluster, MessagesTakeTheirTimeOfTheProcessorAndOfTheLine) {
   const double plain = run(2, border::Sync::kConservative, {});
-  const double slow = run(2, border::Sync::kConservative, {.send_seconds = 2, .receive_seconds = 1});
+  const double slow = run(2, border::Sync::kConservative, {.send = 2.0, .receive = 1.0});
   const std::uint64_t sent = cluster_->core(0).stats().messages_sent;
   ASSERT_GT(sent, 0u);
   // What the other has sent last may not have been taken when the session ends.
@@ -114,10 +125,10 @@ TEST_F(ModelOfACluster, MessagesTakeTheirTimeOfTheProcessorAndOfTheLine) {
 }
 
 TEST_F(ModelOfACluster, ARecordedWorldDoesTheSameAgain) {
-  (void)run(2, border::Sync::kAnticipative, {.latency = 1, .send_seconds = 0.5});
+  (void)run(2, border::Sync::kAnticipative, {.latency = 1, .send = 0.5});
   BodyCosts again = by_the_body();
   const Cluster::Usage replayed = cluster_->replay(1, cluster_->recorded(1), again);
-  const Cluster nobody(two_groups(), map_, {.last_step = kSteps}, {.send_seconds = 0.5}, again, false);
+  const Cluster nobody(two_groups(), map_, {.last_step = kSteps}, {.send = 0.5}, again, false);
   EXPECT_EQ(nobody.replay(1, cluster_->recorded(1), again).seconds, replayed.seconds) << "where there are no others";
   EXPECT_EQ(replayed.pieces, cluster_->usage(1).pieces);
   EXPECT_EQ(replayed.seconds, cluster_->usage(1).seconds);
