@@ -41,6 +41,13 @@ double Yardstick::slowness() {
   return some[1] / at_first_;
 }
 
+MeasuredCosts::MeasuredCosts(Yardstick* yardstick) : yardstick_(yardstick) {
+  for (int i = 0; i < 100; ++i) {
+    const double begun = cpu_seconds();
+    reading_ = std::min(reading_, cpu_seconds() - begun);
+  }
+}
+
 void MeasuredCosts::begin(const border::WorldCore& core) {
   constexpr double kEvery = 0.2;  // s of CPU time: others begin and end all the time
   bodies_ = core.stats().timeline.bodies_computed;
@@ -53,7 +60,7 @@ void MeasuredCosts::begin(const border::WorldCore& core) {
 
 double MeasuredCosts::spent(WorldId world, const border::WorldCore& core, Activity activity, double) {
   const double now = cpu_seconds();
-  double seconds = (now - since_) / slowness_;
+  double seconds = std::max(0.0, now - since_ - reading_) / slowness_;
   if (activity == Activity::kWorking) seconds = clipped(world, core, seconds);
   since_ = cpu_seconds();
   return factors[static_cast<std::size_t>(activity)] * seconds;

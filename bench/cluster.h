@@ -75,10 +75,11 @@ class Yardstick {
 // when the yardstick was made, if there is one. Preemption is not in it, but what others leave in the caches is, and on
 // a virtual machine what the host takes away: the very same piece of work takes three times as long once in a hundred
 // times, and of many worlds there is always one which that befalls. So large pieces are told as at most twice the
-// median of their like: those of the same world that compute about as many bodies.
+// median of their like: those of the same world that compute about as many bodies. What reading the clock takes is left
+// out.
 class MeasuredCosts final : public Costs {
  public:
-  explicit MeasuredCosts(Yardstick* yardstick = nullptr) : yardstick_(yardstick) {}
+  explicit MeasuredCosts(Yardstick* yardstick = nullptr);
   std::array<double, kActivities> factors{1, 1, 1, 1};
   void begin(const border::WorldCore& core) override;
   double spent(WorldId world, const border::WorldCore& core, Activity activity, double now) override;
@@ -89,6 +90,7 @@ class MeasuredCosts final : public Costs {
   std::uint64_t bodies_ = 0;                                          // computed before
   Step clock_ = 0;                                                    // likewise
   std::map<std::array<std::uint32_t, 3>, std::vector<double>> like_;  // s, by world and kind
+  double reading_ = 1e9;  // s, of the clock
   double slowness_ = 1, known_at_ = -1e9;                             // s of CPU time
   double since_ = 0;
 };

@@ -241,10 +241,9 @@ class Experiment {
         some.push_back(w);
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
     if (!file) throw std::runtime_error("cannot keep what worlds are given");
-    const Step steps = steps_ / 3;
     const Cluster::Usage together = apart([&] {
       warm_heap(heap(worlds_));
-      return Run(scene_, worlds_, {mode.name, mode.sync, false}, network, steps, kAlone, yardstick_)
+      return Run(scene_, worlds_, {mode.name, mode.sync, false}, network, steps_, kAlone, yardstick_)
           .together(some, file.get());
     });
     std::rewind(file.get());
@@ -255,7 +254,7 @@ class Experiment {
         warm_heap(heap(1));
         MeasuredCosts costs(&yardstick_);
         return Cluster(scene_, bisect(scene_, make_grid(scene_), worlds_),
-                       {.last_step = steps, .sync = mode.sync, .window = kWindow}, network, costs, false)
+                       {.last_step = steps_, .sync = mode.sync, .window = kWindow}, network, costs, false)
             .replay(w, pieces, costs);
       });
       for (std::size_t a = 0; a < kActivities; ++a) alone.seconds[a] += one.seconds[a];
