@@ -31,7 +31,7 @@ class CostBySize {
     double bytes, seconds;
   };
   explicit CostBySize(std::vector<Known> known) : known_(std::move(known)) {}  // by size, ascending; not empty
-  double operator()(std::size_t bytes) const;                                 // s
+  double operator()(std::size_t bytes) const;                                  // s
 
  private:
   std::vector<Known> known_;
@@ -90,7 +90,7 @@ class MeasuredCosts final : public Costs {
   std::uint64_t bodies_ = 0;                                          // computed before
   Step clock_ = 0;                                                    // likewise
   std::map<std::array<std::uint32_t, 3>, std::vector<double>> like_;  // s, by world and kind
-  double reading_ = 1e9;  // s, of the clock
+  double reading_ = 1e9;                                              // s, of the clock
   double slowness_ = 1, known_at_ = -1e9;                             // s of CPU time
   double since_ = 0;
 };

@@ -57,8 +57,8 @@ void warm_heap(std::size_t bytes) {
   mallopt(M_TRIM_THRESHOLD, -1);  // never
   mallopt(M_TOP_PAD, 64 << 20);
   mallopt(M_MMAP_MAX, 0);
-  // Small pieces are joined as they are freed. Otherwise malloc does it for the whole heap at once now and then, and the
-  // world that happens to free something large then tidies up after all others (up to 1 ms).
+  // Small pieces are joined as they are freed. Otherwise malloc does it for the whole heap at once now and then, and
+  // the world that happens to free something large then tidies up after all others (up to 1 ms).
   mallopt(M_MXFAST, 0);
   constexpr std::size_t kPiece = std::size_t{1} << 16;
   std::vector<std::unique_ptr<char[]>> pieces;

@@ -70,7 +70,8 @@ class Bisector {
   Bisector(const Grid& grid, int last_axis, bool straight, double border, std::vector<WorldId>& owner)
       : grid_(grid), last_axis_(last_axis), straight_(straight), border_(border), owner_(owner) {}
 
-  // Gives world `first`'s cells, which are in `region` with `weights`, to `count` worlds from it on. False: it has cut itself off from a way to give each world a cell.
+  // Gives world `first`'s cells, which are in `region` with `weights`, to `count` worlds from it on. False: it has cut
+  // itself off from a way to give each world a cell.
   bool split(const Region& region, std::span<const Weight> weights, WorldId first, WorldId count) {
     if (count == 1) return true;
     const WorldId lower = count / 2, second = first + lower;
@@ -98,8 +99,8 @@ class Bisector {
         if (there == here || (there != first && there != second)) continue;
         Weight heard = w;
         heard.at[axis] = 2 * next[axis] + (way < 0);
-        heard.cost = w.cost *
-                     (way < 0 ? heard_below(w.at[axis], next[axis] + 1) : heard_above(w.at[axis], next[axis])) / 8;
+        heard.cost =
+            w.cost * (way < 0 ? heard_below(w.at[axis], next[axis] + 1) : heard_above(w.at[axis], next[axis])) / 8;
         if (heard.cost > 0) (there == first ? below_weights : above_weights).push_back(heard);
       }
     }
@@ -198,12 +199,12 @@ class Bisector {
         cells_below += cells[axis][i - 1];
         // Each side must have a cell for each of its worlds.
         if (cells_below < lower || all_cells - cells_below < count - lower) continue;
-        const std::uint64_t heard_low = border_ == 0 ? 0 : (kHeard * slice[2 * i] + kHeardOfSome * slice[2 * i + 1]) / 8,
+        const std::uint64_t heard_low =
+                                border_ == 0 ? 0 : (kHeard * slice[2 * i] + kHeardOfSome * slice[2 * i + 1]) / 8,
                             heard_high =
                                 border_ == 0 ? 0 : (kHeard * slice[2 * i - 1] + kHeardOfSome * slice[2 * i - 2]) / 8;
-        const std::int64_t misplaced =
-            static_cast<std::int64_t>(below + heard_low) -
-            wanted_below(region, axis, total + heard_low + heard_high, lower, count);
+        const std::int64_t misplaced = static_cast<std::int64_t>(below + heard_low) -
+                                       wanted_below(region, axis, total + heard_low + heard_high, lower, count);
         const std::uint64_t near = slice[2 * i - 1] + slice[2 * i];
         const auto uneven = static_cast<std::uint64_t>(std::abs(2 * static_cast<std::int64_t>(i) - length));
         const std::tuple cost{axis == last_axis_, 4 * static_cast<std::uint64_t>(std::abs(misplaced)) + near,
@@ -238,7 +239,7 @@ class Bisector {
       std::size_t cells = 0;
       std::int64_t work = 0, near_here = 0, near_there = 0;
       std::int64_t more_heard_low = 0, more_heard_high = 0;  // by each side if the row goes over, in eighths
-      std::int64_t near_begin = 0, near_end = 0;  // in the slice, near the row's two ends
+      std::int64_t near_begin = 0, near_end = 0;             // in the slice, near the row's two ends
     };
     const auto count = static_cast<std::size_t>(region.high[along] - region.low[along]);
     std::vector<Row> rows(count);
@@ -255,8 +256,10 @@ class Bisector {
       if (border_ > 0) {
         const std::int64_t cost = w.cost, where = w.at[axis];
         const auto p = static_cast<std::int32_t>(where);
-        row.more_heard_low += cost * (static_cast<int>(heard_below(p, there)) - static_cast<int>(heard_below(p, cut.at)));
-        row.more_heard_high += cost * (static_cast<int>(heard_above(p, there)) - static_cast<int>(heard_above(p, cut.at)));
+        row.more_heard_low +=
+            cost * (static_cast<int>(heard_below(p, there)) - static_cast<int>(heard_below(p, cut.at)));
+        row.more_heard_high +=
+            cost * (static_cast<int>(heard_above(p, there)) - static_cast<int>(heard_above(p, cut.at)));
       }
       if (cell_of(w)[axis] != slice || owner(cell_of(w)) != giver.first) continue;
       row.work += w.cost;
@@ -281,7 +284,8 @@ class Bisector {
         cells += row.cells;
         if (cells > may_go) break;
         misplaced += down ? -row.work : row.work;
-        misplaced += (row.more_heard_low * high.worlds - row.more_heard_high * low.worlds) / (low.worlds + high.worlds) / 8;
+        misplaced +=
+            (row.more_heard_low * high.worlds - row.more_heard_high * low.worlds) / (low.worlds + high.worlds) / 8;
         near += row.near_there - row.near_here;
         const std::int64_t end = backwards ? row.near_begin + next.near_end : row.near_end + next.near_begin;
         if (4 * std::abs(misplaced) + near + end < best)

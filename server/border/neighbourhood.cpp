@@ -17,7 +17,6 @@ Neighbourhood::Neighbourhood(const physics::Model& model, const Territories& ter
       me_(me),
       since_(territories.worlds(), kNever),
       half_edge_(0.5 * territories.grid().edge) {
-  model_grew();
   territories_change(0);
 }
 
@@ -37,21 +36,12 @@ Step Neighbourhood::hops() const {
   return hops_;
 }
 
-void Neighbourhood::model_grew() {
-  for (const physics::BodyModel& m : model_.bodies().subspan(ordinary_below_.size())) {
-    const double room = (half_edge_ - 2 * m.reach - physics::kContactMargin) / model_.scene().dt;
-    ordinary_below_.push_back(room > 0 ? room * room : -1);
-  }
-}
-
 std::size_t Neighbourhood::cell_of(const BodyState& body) const {
   return territories_.grid().index(territories_.grid().cell_of(body.x()));
 }
 
 bool Neighbourhood::is_wide(const BodyState& body) const {
-  if (alone_) return false;
-  const auto index = static_cast<std::size_t>(model_.find(body.id) - model_.bodies().data());
-  if (body.v().squaredNorm() <= ordinary_below_[index]) return false;
+  if (alone_ || physics::reach_bound(body, model_.find(body.id)->reach, model_.scene().dt) <= half_edge_) return false;
   const Aabb box = physics::reach_box(body, model_);
   const Vec3 x = body.x();
   return (box.max - x).maxCoeff() > half_edge_ || (x - box.min).maxCoeff() > half_edge_;
@@ -81,7 +71,7 @@ bool Neighbourhood::place_changes(const BodyState& body, Step step) const {
 void Neighbourhood::reached_by_box(const BodyState& body, Step step, std::vector<WorldId>& worlds) const {
   const Grid& grid = territories_.grid();
   const Aabb box = physics::reach_box(body, model_);
-  const Vec3 half = Vec3::Constant(0.5 * grid.edge);
+  const Vec3 half = Vec3::Constant(half_edge_);
   const Cell low = grid.cell_of(box.min - half), high = grid.cell_of(box.max + half);
   const std::span<const WorldId> owners = territories_.owners(step);
   WorldId last = kNoWorld;

@@ -17,7 +17,6 @@ class Neighbourhood {
   // `model` and `territories` must outlive it.
   Neighbourhood(const physics::Model& model, const Territories& territories, WorldId me);
 
-  void model_grew();                   // a body has been added to the model
   void territories_change(Step step);  // a transfer of that step has become known
 
   // H: a transfer told at a final step F is of step F + K + H + 2 at least, so that all know it in time (trade.h).
@@ -58,8 +57,6 @@ class Neighbourhood {
   bool alone_ = true;        // no world is a neighbour, ever
   mutable Step hops_ = -1;   // -1: not known yet
   double half_edge_ = 0;
-  // By body: below this square of its speed, (m/s)^2, its reach box cannot leave half a cell, however it turns.
-  std::vector<double> ordinary_below_;
 };
 
 }  // namespace soda::border

@@ -108,7 +108,6 @@ class WorldCore::Impl final : timeline::Arbiter {
                           ", which is closed");
     if (const auto* spawn = std::get_if<Spawn>(&action.action)) {
       model_.add(spawn->body);
-      neighbourhood_.model_grew();
     }
     timeline_.act(action);
     settler_.hurry(timeline_.newest());

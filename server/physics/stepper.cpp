@@ -97,6 +97,10 @@ Aabb reach_box(const BodyState& state, const BodyModel& model, const Mat3& rotat
   return box;
 }
 
+double reach_bound(const BodyState& state, double reach, double dt) {
+  return reach * (1 + std::min(1.0, state.w().norm() * dt)) + state.v().norm() * dt + kContactMargin;
+}
+
 Aabb reach_box(const BodyState& state, const Model& scene) {
   return reach_box(state, *scene.find(state.id), state.q().toRotationMatrix(), scene);
 }

@@ -28,6 +28,9 @@ namespace soda::physics {
 // function of its state alone. Two bodies whose boxes do not overlap do not touch in this step.
 Aabb reach_box(const BodyState& state, const BodyModel& model, const Mat3& rotation, const Model& scene);
 Aabb reach_box(const BodyState& state, const Model& scene);
+// How far at most that box goes from the body's centre, m, along each axis; quicker. `reach`: BodyModel::reach; `dt`,
+// s.
+double reach_bound(const BodyState& state, double reach, double dt);
 
 // What was solved in one way, over all steps.
 struct ModelShare {

@@ -199,10 +199,7 @@ void Timeline::change_hands(Step step) {
 }
 
 bool Timeline::is_large(Slot slot, const BodyState& body) const {
-  const double radius = slots_.body(slot).reach, dt = model_.scene().dt;
-  const double reach =
-      radius * (1 + std::min(1.0, body.w().norm() * dt)) + body.v().norm() * dt + physics::kContactMargin;
-  return reach > index_.ordinary_reach();
+  return physics::reach_bound(body, slots_.body(slot).reach, model_.scene().dt) > index_.ordinary_reach();
 }
 
 void Timeline::note(Slot slot, const BodyState& body) { index_.note(slot, body.x(), is_large(slot, body), newest()); }
