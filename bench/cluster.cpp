@@ -18,7 +18,8 @@ double CostBySize::operator()(std::size_t bytes) const {
   std::size_t i = 1;
   while (i + 1 < known_.size() && known_[i].bytes < size) ++i;
   const Known &low = known_[i - 1], &high = known_[i];
-  return low.seconds + (high.seconds - low.seconds) * (size - low.bytes) / (high.bytes - low.bytes);
+  // By noise a larger one may have been quicker.
+  return std::max(0.0, low.seconds + (high.seconds - low.seconds) * (size - low.bytes) / (high.bytes - low.bytes));
 }
 
 Yardstick::Yardstick() : model_(generate("piles", 324, 1)), stepper_(model_), start_(model_.initial_state()) {

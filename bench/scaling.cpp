@@ -210,23 +210,28 @@ auto apart(F&& f) {
 // One scene on so many worlds.
 class Experiment {
  public:
-  Experiment(const Scene& scene, WorldId worlds, Step steps, int rounds, Yardstick& yardstick)
-      : scene_(scene), worlds_(worlds), steps_(steps), rounds_(rounds), yardstick_(yardstick) {}
+  Experiment(const Scene& scene, WorldId worlds, Step steps, Yardstick& yardstick)
+      : scene_(scene), worlds_(worlds), steps_(steps), yardstick_(yardstick) {}
 
-  // The least busy of the rounds: others on the machine only add to what is measured.
   Outcome run(const Mode& mode, const Network& network) {
     const Factors factors = this->factors(mode, network);
-    Outcome best;
-    for (int round = 0; round < rounds_; ++round) {
-      Outcome o = apart([&] {
-        warm_heap(heap(worlds_));
-        return Run(scene_, worlds_, mode, network, steps_, factors, yardstick_).outcome();
-      });
-      o.alone = factors[static_cast<std::size_t>(Activity::kWorking)];
-      if (round == 0 || o.busy_mean < best.busy_mean) best = o;
-    }
+    Outcome o = apart([&] {
+      warm_heap(heap(worlds_));
+      return Run(scene_, worlds_, mode, network, steps_, factors, yardstick_).outcome();
+    });
+    o.alone = factors[static_cast<std::size_t>(Activity::kWorking)];
+    return o;
+  }
+
+  // The least busy of some: others on the machine only add to what is measured.
+  Outcome best(const Mode& mode, const Network& network, int rounds) {
+    Outcome best = run(mode, network);
+    for (int round = 1; round < rounds; ++round)
+      if (const Outcome o = run(mode, network); o.busy_mean < best.busy_mean) best = o;
     return best;
   }
+  // The next run measures anew what a world's work costs alone.
+  void forget() { factors_[0].reset(), factors_[1].reset(); }
 
  private:
   // What a world's work costs in a process of its own against what it costs among the others, where all share one
@@ -272,7 +277,6 @@ class Experiment {
   const Scene& scene_;
   const WorldId worlds_;
   const Step steps_;
-  const int rounds_;
   Yardstick& yardstick_;
   std::optional<Factors> factors_[2];
 };
@@ -323,36 +327,80 @@ std::string key(const std::string& what, WorldId worlds, const Mode& mode) {
          (mode.sync == border::Sync::kAnticipative ? "" : std::string("_") + mode.name);
 }
 
+// One world and many, measured one after the other: what others do on the machine, or its host, slows a large world
+// down more than small ones.
+struct Pair {
+  Outcome one, many;
+  double efficiency(WorldId worlds) const { return one.step / many.step / worlds; }
+};
+
+// Of several the one with the median efficiency.
+const Pair& median_of(std::vector<Pair>& pairs) {
+  const auto middle = pairs.begin() + (std::ssize(pairs) - 1) / 2;
+  std::nth_element(pairs.begin(), middle, pairs.end(),
+                   [](const Pair& l, const Pair& r) { return l.efficiency(1) < r.efficiency(1); });
+  return *middle;
+}
+
+// What is measured on so many worlds.
+struct Case {
+  std::string kind, name;  // in the table; in the headline
+  Mode mode;
+  Network network;
+};
+
+std::vector<Case> cases(WorldId worlds, const Size& size, const Network& network) {
+  std::vector<Case> all;
+  for (const Mode& mode : kModes)
+    if (worlds > 1 || mode.sync == border::Sync::kAnticipative)  // alone, all are the same
+      all.push_back({"strong", "city.efficiency", mode, network});
+  if (worlds != size.common()) return all;
+  // What the answer depends on: a slow network, and a second core that takes messages from DDS.
+  Network slow = network, relieved = network;
+  slow.latency *= 10;
+  relieved.receive = 0;
+  for (const Mode& mode : kModes) {
+    if (mode.barrier) continue;
+    all.push_back({"strong latency x 10", "city.efficiency_latency_x10", mode, slow});
+    all.push_back({"strong second core", "city.efficiency_second_core", mode, relieved});
+  }
+  return all;
+}
+
 void strong(const Scene& scene, const Size& size, const Network& network, int rounds, Yardstick& yardstick,
             Tables& tables, Headline& headline, Common& common) {
-  Experiment lone(scene, 1, size.steps, rounds, yardstick);
+  Experiment lone(scene, 1, size.steps, yardstick);
   for (const WorldId worlds : size.strong) {
-    Experiment experiment(scene, worlds, size.steps, rounds, yardstick);
-    // Anew beside each size: what others do on the machine, or its host, slows a large world down more than small ones.
-    const Outcome alone = lone.run(kAnticipative, network);
-    const double one = alone.step;
-    for (const Mode& mode : kModes) {
-      if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;  // alone, all are the same
-      const Outcome o = worlds == 1 ? alone : experiment.run(mode, network);
-      const auto efficiency = [&](const Outcome& of) { return one / of.step / worlds; };
-      tables.add("strong", mode, worlds, size.bodies, o, one);
-      headline.add(key("city.efficiency", worlds, mode), efficiency(o));
-      headline.add(key("city.waiting_share", worlds, mode), 1 - o.busy_mean / o.step);
+    Experiment experiment(scene, worlds, size.steps, yardstick);
+    const std::vector<Case> measured = cases(worlds, size, network);
+    std::vector<std::vector<Pair>> pairs(measured.size());
+    for (int round = 0; round < (worlds > size.common() ? 1 : rounds); ++round) {
+      experiment.forget();
+      Pair pair;
+      for (std::size_t i = 0; i < measured.size(); ++i) {
+        if (i % std::size(kModes) == 0) pair.one = lone.run(kAnticipative, network);
+        pair.many = worlds == 1 ? pair.one : experiment.run(measured[i].mode, measured[i].network);
+        pairs[i].push_back(pair);
+      }
+    }
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      const Case& c = measured[i];
+      if (rounds > 1) {
+        std::printf("%s %s %u, efficiency by round:", c.kind.c_str(), c.mode.name, worlds);
+        for (const Pair& pair : pairs[i]) std::printf(" %.3f", pair.efficiency(worlds));
+        std::printf("\n");
+      }
+      const Pair& pair = median_of(pairs[i]);
+      const Outcome& o = pair.many;
+      tables.add(c.kind, c.mode, worlds, size.bodies, o, pair.one.step);
+      headline.add(key(c.name, worlds, c.mode), pair.efficiency(worlds));
+      if (c.kind != "strong") continue;
+      headline.add(key("city.waiting_share", worlds, c.mode), 1 - o.busy_mean / o.step);
       if (worlds != size.common()) continue;
-      common.emplace_back(mode, o);
-      headline.add(key("city.more_work", worlds, mode), o.busy_mean * worlds / one);
-      headline.add(key("city.uneven", worlds, mode), o.busy_max / o.busy_mean);
-      headline.add(key("city.busiest_waits", worlds, mode), o.step / o.busy_max);
-      // What the answer depends on: a slow network, and a second core that takes messages from DDS.
-      if (mode.barrier) continue;
-      Network slow = network, relieved = network;
-      slow.latency *= 10;
-      relieved.receive = 0;
-      const Outcome late = experiment.run(mode, slow), helped = experiment.run(mode, relieved);
-      tables.add("strong latency x 10", mode, worlds, size.bodies, late, one);
-      tables.add("strong second core", mode, worlds, size.bodies, helped, one);
-      headline.add(key("city.efficiency_latency_x10", worlds, mode), efficiency(late));
-      headline.add(key("city.efficiency_second_core", worlds, mode), efficiency(helped));
+      common.emplace_back(c.mode, o);
+      headline.add(key("city.more_work", worlds, c.mode), o.busy_mean * worlds / pair.one.step);
+      headline.add(key("city.uneven", worlds, c.mode), o.busy_max / o.busy_mean);
+      headline.add(key("city.busiest_waits", worlds, c.mode), o.step / o.busy_max);
     }
   }
 }
@@ -363,10 +411,10 @@ void weak(const Size& size, const Network& network, int rounds, Yardstick& yards
   for (const WorldId worlds : size.weak) {
     const std::uint32_t bodies = worlds * size.bodies_per_world;
     const Scene scene = city(bodies);
-    Experiment experiment(scene, worlds, size.steps, rounds, yardstick);
+    Experiment experiment(scene, worlds, size.steps, yardstick);
     for (const Mode& mode : kModes) {
       if (worlds == 1 && mode.sync == border::Sync::kConservative) continue;
-      const Outcome o = experiment.run(mode, network);
+      const Outcome o = experiment.best(mode, network, rounds);
       if (worlds == 1) one = o.step;
       tables.add("weak", mode, worlds, bodies, o, one);
       headline.add(key("weak.efficiency", worlds, mode), one / o.step);
@@ -402,7 +450,7 @@ void check(const Scene& scene, const Size& size, const Network& network, const O
   for (std::size_t i = 0; i < kCases; ++i) {
     const WorldId worlds = kWorlds[i];
     const auto model = [&](Step steps) {
-      return Experiment(scene, worlds, steps, rounds, yardstick).run(kAnticipative, network);
+      return Experiment(scene, worlds, steps, yardstick).best(kAnticipative, network, rounds);
     };
     const Outcome less = model(settled), more = model(settled + size.steps);
     const auto each = [&](double Outcome::*of) {

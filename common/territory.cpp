@@ -254,12 +254,12 @@ class Bisector {
       if (is_near(cut.at)) row.near_here += w.cost;
       if (is_near(there)) row.near_there += w.cost;
       if (border_ > 0) {
-        const std::int64_t cost = w.cost, where = w.at[axis];
-        const auto p = static_cast<std::int32_t>(where);
-        row.more_heard_low +=
-            cost * (static_cast<int>(heard_below(p, there)) - static_cast<int>(heard_below(p, cut.at)));
-        row.more_heard_high +=
-            cost * (static_cast<int>(heard_above(p, there)) - static_cast<int>(heard_above(p, cut.at)));
+        const auto change = [&](std::uint32_t (*heard)(std::int32_t, std::int32_t)) {
+          return static_cast<std::int64_t>(w.cost) *
+                 (static_cast<int>(heard(w.at[axis], there)) - static_cast<int>(heard(w.at[axis], cut.at)));
+        };
+        row.more_heard_low += change(heard_below);
+        row.more_heard_high += change(heard_above);
       }
       if (cell_of(w)[axis] != slice || owner(cell_of(w)) != giver.first) continue;
       row.work += w.cost;
@@ -277,15 +277,15 @@ class Bisector {
     std::size_t most = 0;
     bool from_end = false;
     for (const bool backwards : {false, true}) {
-      std::int64_t misplaced = cut.misplaced, near = near_straight;
+      std::int64_t work = 0, more_heard = 0, near = near_straight;  // gone below
       std::size_t cells = 0;
       for (std::size_t n = 1; n < count; ++n) {
         const Row &row = rows[backwards ? count - n : n - 1], &next = rows[backwards ? count - n - 1 : n];
         cells += row.cells;
         if (cells > may_go) break;
-        misplaced += down ? -row.work : row.work;
-        misplaced +=
-            (row.more_heard_low * high.worlds - row.more_heard_high * low.worlds) / (low.worlds + high.worlds) / 8;
+        work += down ? -row.work : row.work;
+        more_heard += row.more_heard_low * high.worlds - row.more_heard_high * low.worlds;
+        const std::int64_t misplaced = cut.misplaced + work + more_heard / (8 * std::int64_t{low.worlds + high.worlds});
         near += row.near_there - row.near_here;
         const std::int64_t end = backwards ? row.near_begin + next.near_end : row.near_end + next.near_begin;
         if (4 * std::abs(misplaced) + near + end < best)

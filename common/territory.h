@@ -16,9 +16,9 @@ struct TerritoryMap {
   WorldId owner_of(const Vec3& position) const { return owner[grid.index(grid.cell_of(position))]; }
 };
 
-// What a side of a territory behind which there are others costs, as so many bodies: messages, and their bodies near
-// the border. Measured with 1,000 bodies per world and 8 neighbours around it (docs/experiments.md). At most an eighth
-// of a world's mean work is counted for it.
+// What a side of a territory behind which there are others costs, as so many bodies: messages. Measured with 1,000
+// bodies per world and 8 neighbours around it (docs/experiments.md). At most an eighth of a world's mean work is
+// counted for it. What is heard of across it counts apart, but where this is 0.
 constexpr double kBorderBodies = 57;
 
 // Recursive bisection of the grid, weighted by what its cells will cost: connected territories with about the same work

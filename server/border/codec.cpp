@@ -267,7 +267,10 @@ Header get_header(Reader& in) {
   h.to_epoch = in.get<std::uint32_t>("to_epoch");
   h.sequence = in.get<std::uint64_t>("sequence");
   h.ack = in.get<std::uint64_t>("ack");
-  h.need = in.get<std::uint8_t>("need") != 0;
+  const auto ask = in.get<std::uint8_t>("ask");
+  if (ask > static_cast<std::uint8_t>(Ask::kAgain)) throw CodecError("ask: no such question");
+  h.ask = static_cast<Ask>(ask);
+  h.sent = in.get<std::uint64_t>("sent");
   h.upto = in.get<Step>("upto");
   h.final_step = in.get<Step>("final");
   h.near_final = in.get<Step>("near final");
@@ -339,7 +342,8 @@ void encode(const Message& message, std::vector<std::byte>& out) {
   put(out, h.to_epoch);
   put(out, h.sequence);
   put(out, h.ack);
-  put(out, static_cast<std::uint8_t>(h.need));
+  put(out, static_cast<std::uint8_t>(h.ask));
+  put(out, h.sent);
   put(out, h.upto);
   put(out, h.final_step);
   put(out, h.near_final);

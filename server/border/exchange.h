@@ -47,14 +47,14 @@ struct Exchange {
   MixedIslands parts;  // of all origins, this world included
   std::uint32_t revisions = 0;
   std::uint64_t part_content = 0;
-  // By link: the revision of the part that it was told. (Not its content: one that has become again what it was may
-  // have been told to others in between, who pass on that one, and word that it is final.)
+  // What a link was told of this world's part: its revision (not its content: one that has become again what it was may
+  // have been told to others in between, who pass on that one, and word that it is final), and whether all of it.
   struct Told {
     std::uint32_t revision = 0;
     bool whole = false;
-    bool operator==(const Told&) const = default;
   };
-  std::vector<std::optional<Told>> told;
+  std::vector<std::optional<Told>> told;  // by link
+  bool own_due = false;                   // own components are to be passed on, once the part has been told
   struct Passed {
     Revision revision;
     bool whole = false;

@@ -16,7 +16,7 @@ constexpr std::size_t kSpare = 8;  // messages whose memory is kept: more than a
 Link::Link(std::uint64_t session, WorldId me, std::uint32_t epoch, WorldId peer, std::size_t index)
     : session_(session), me_(me), peer_(peer), index_(index), epoch_(epoch) {}
 
-Header Link::header(std::uint64_t sequence, bool need) const {
+Header Link::header(std::uint64_t sequence, Ask ask) const {
   Header h;
   h.session = session_;
   h.from = me_;
@@ -25,7 +25,8 @@ Header Link::header(std::uint64_t sequence, bool need) const {
   h.to_epoch = peer_epoch_.value_or(0);
   h.sequence = sequence;
   h.ack = received_;
-  h.need = need;
+  h.ask = ask;
+  h.sent = sent_;
   h.upto = told_upto_;
   h.final_step = told_final_;
   h.near_final = told_near_final_;
@@ -37,7 +38,8 @@ void Link::send(Step upto, Step final_step, Step near_final, ActionNumber logged
   told_upto_ = upto;
   told_final_ = final_step;
   told_near_final_ = near_final;
-  next_.header = header(++sent_, false);
+  ++sent_;
+  next_.header = header(sent_, Ask::kNothing);
   next_.header.logged = logged;
   std::vector<std::byte> bytes;
   if (!spare_.empty()) {
@@ -50,17 +52,22 @@ void Link::send(Step upto, Step final_step, Step near_final, ActionNumber logged
   next_.clear();
 }
 
+void Link::interrupted() {
+  repeat_ = true;
+  ask_ = Ask::kAgain;
+}
+
 void Link::collect(std::vector<std::vector<std::byte>>& out) {
   if (std::exchange(repeat_, false)) {
     out.insert(out.end(), log_.begin(), log_.end());
     resent_ += log_.size();
   }
-  if (std::exchange(ask_, false)) {
-    asked_after_ = received_;
-    Message request;
-    request.header = header(0, true);
-    out.push_back(encode(request));
-  }
+  const Ask ask = std::exchange(ask_, Ask::kNothing);
+  if (!std::exchange(answer_, false) && ask == Ask::kNothing) return;
+  if (ask == Ask::kAgain) asked_after_ = received_;
+  Message outside;
+  outside.header = header(0, ask);
+  out.push_back(encode(outside));
 }
 
 void Link::receive(Message& message, const std::function<void(Message&)>& deliver) {
@@ -75,8 +82,12 @@ void Link::receive(Message& message, const std::function<void(Message&)>& delive
       if (spare_.size() < kSpare) spare_.push_back(std::move(log_.front()));
       log_.pop_front();
     }
-  if (h.need) repeat_ = true;
-  if (h.sequence == 0) return;
+  if (h.ask == Ask::kAgain) repeat_ = true;
+  if (h.ask == Ask::kNews) answer_ = true;
+  if (h.sequence == 0) {
+    if (h.sent > received_) ask_ = Ask::kAgain;
+    return;
+  }
   if (h.sequence <= received_ || early_.contains(h.sequence)) {
     ++duplicates_;
     return;
@@ -98,7 +109,7 @@ void Link::receive(Message& message, const std::function<void(Message&)>& delive
     early_.erase(early_.begin());
     take(next);
   }
-  if (!early_.empty() && asked_after_ != received_) ask_ = true;
+  if (!early_.empty() && asked_after_ != received_) ask_ = Ask::kAgain;
 }
 
 }  // namespace soda::border

@@ -2,6 +2,7 @@
 // what has not been acknowledged, to be sent again when asked.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -46,11 +47,12 @@ class Link {
   Step told_near_final() const { return told_near_final_; }
   // Closes the next message of the stream and appends it, as bytes, to `out`.
   void send(Step upto, Step final_step, Step near_final, ActionNumber logged, std::vector<std::vector<std::byte>>& out);
-  // Asks the peer for what is missing here, at the next collect().
-  void ask() { ask_ = true; }
-  // Also repeats what it has not acknowledged.
-  void interrupted() { ask_ = repeat_ = true; }
-  // Appends requests and repetitions that are due.
+  // Asks the peer at the next collect() how much it has sent; and again for all that is missing here, when it answers.
+  // (Not at once: it may just be about to send, or have sent what is still on its way.)
+  void ask() { ask_ = std::max(ask_, Ask::kNews); }
+  // Asks for what is missing without asking whether anything is, and repeats what the peer has not acknowledged.
+  void interrupted();
+  // Appends questions, answers and repetitions that are due.
   void collect(std::vector<std::vector<std::byte>>& out);
 
   // ---- in
@@ -65,11 +67,12 @@ class Link {
   // The peer has reached a step, or is done with it, as far as it matters here.
   bool reached(Step step) const { return step < since_ || upto_ >= step; }
   bool finished(Step step) const { return step < since_ || final_ >= step; }
+  std::uint64_t delivered() const { return received_; }  // messages
   std::uint64_t duplicates() const { return duplicates_; }
   std::uint64_t resent() const { return resent_; }
 
  private:
-  Header header(std::uint64_t sequence, bool need) const;
+  Header header(std::uint64_t sequence, Ask ask) const;
   std::uint64_t session_;
   WorldId me_, peer_;
   std::size_t index_;
@@ -82,7 +85,8 @@ class Link {
   std::uint64_t sent_ = 0;                     // newest number sent
   std::deque<std::vector<std::byte>> log_;     // messages sent_ - log_.size() + 1 .. sent_
   std::vector<std::vector<std::byte>> spare_;  // memory for messages to come
-  bool repeat_ = false, ask_ = false;
+  bool repeat_ = false, answer_ = false;
+  Ask ask_ = Ask::kNothing;
 
   std::uint64_t received_ = 0;                     // everything up to this number has been delivered
   std::uint64_t asked_after_ = ~std::uint64_t{0};  // the gap after this number has been asked for already

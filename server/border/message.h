@@ -76,14 +76,22 @@ struct Answer {
   bool accepted = false;     // then the sender counts on it
 };
 
+// What the sender of a message wants to know.
+enum class Ask : std::uint8_t {
+  kNothing,
+  kNews,  // how much there is: it has heard nothing for some time
+  kAgain  // everything after `ack` once more: something is missing
+};
+
 struct Header {
   std::uint64_t session = 0;  // what both ends must agree on: see session_tag
   WorldId from = 0, to = 0;
   std::uint32_t epoch = 0, to_epoch = 0;
-  std::uint64_t sequence = 0;  // from 1; 0: outside of the stream, only `ack` and `need` count
+  std::uint64_t sequence = 0;  // from 1; 0: outside of the stream, only `ack`, `ask` and `sent` count
   std::uint64_t ack = 0;       // everything up to this number has arrived at the sender
-  bool need = false;           // the sender asks for everything after `ack` again
-  Step upto = 0;               // the sender's front: all states up to it are computed and told; can fall
+  Ask ask = Ask::kNothing;
+  std::uint64_t sent = 0;  // the newest number that the sender has sent
+  Step upto = 0;           // the sender's front: all states up to it are computed and told; can fall
   Step final_step = 0;
   Step near_final = 0;      // up to this step the sender's parts will not change any more
   Step durable = 0;         // for checkpoints, later

@@ -73,7 +73,7 @@ class MixedIslands {
 
  private:
   struct Indexed {
-    void add(std::shared_ptr<const Component> component);  // unless it is there
+    void add(std::shared_ptr<const Component> component);
     void sort();
     bool has(BodyId body) const;
     Part part;

@@ -282,7 +282,15 @@ void Settler::pass_on(Step step, const MixedIslands::Closure& closure) {
       const auto known = exchange.passed.find({to, origin});
       const bool begun = known != exchange.passed.end() && known->second.revision == part.revision;
       if (begun && known->second.whole) continue;
-      if (origin == me && exchange.told[link->index()] == Exchange::Told{part.revision.count, true}) continue;
+      if (origin == me) {
+        // Nothing of what is only assumed; and whoever gets some of it must also be told what becomes of it.
+        const std::optional<Exchange::Told>& told = exchange.told[link->index()];
+        if (!told || told->revision != part.revision.count) {
+          exchange.own_due = true;
+          continue;
+        }
+        if (told->whole) continue;
+      }
       Part rest = left_to_pass(step, closure, origin, to, begun ? &known->second : nullptr);
       if (!rest.whole && rest.components.empty()) {
         context_.stats.parts_left += origin != me && !begun;
@@ -376,7 +384,7 @@ void Settler::tell(Step step) {
       std::optional<Exchange::Told>& told = exchange.told[l];
       if (told ? told->revision == exchange.revisions && (told->whole || !to.whole) : !to.worlds.contains(link.peer()))
         continue;
-      told = {exchange.revisions, to.whole};
+      told = Exchange::Told{exchange.revisions, to.whole};
       Part part = mine;
       part.whole = to.whole;
       if (!part.whole)
@@ -388,6 +396,9 @@ void Settler::tell(Step step) {
       ++context_.stats.parts_sent;
     }
   }
+  if (std::exchange(exchange.own_due, false))
+    for (const KeptIsland& island : exchange.kept)
+      if (island.shared) pass_on(step, exchange.parts.close({context_.settings.me, island.index}));
   if (!std::exchange(exchange.finals_due, false)) return;
   for (auto& [key, passed] : exchange.passed) {
     if (passed.final || exchange.parts.find(key.second)->revision != passed.revision ||

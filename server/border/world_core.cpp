@@ -473,6 +473,10 @@ WorldCore::~WorldCore() = default;
 bool WorldCore::receive(std::span<const std::byte> message) { return impl_->receive(message); }
 const std::string& WorldCore::last_refusal() const { return impl_->refusal_; }
 void WorldCore::ask(WorldId neighbour) { impl_->ask(neighbour); }
+std::uint64_t WorldCore::delivered(WorldId neighbour) const {
+  const Link* const link = impl_->context_.link_to(neighbour);
+  return link ? link->delivered() : 0;
+}
 void WorldCore::reconnect(WorldId neighbour) { impl_->reconnect(neighbour); }
 bool WorldCore::act(const LoggedAction& action) { return impl_->act(action); }
 void WorldCore::close_actions(Step step, ActionNumber logged) { impl_->close_actions(step, logged); }

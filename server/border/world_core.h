@@ -128,9 +128,10 @@ class WorldCore {
   // changed (but for transfers that have been said along with what was refused).
   bool receive(std::span<const std::byte> message);
   const std::string& last_refusal() const;
-  // Nothing has come from that neighbour for some time: asks it for what is missing here, if anything is. Harmless at
-  // any time.
+  // Nothing new has come from that neighbour for some time: finds out whether something is missing here, and asks for
+  // it if so. Harmless at any time.
   void ask(WorldId neighbour);
+  std::uint64_t delivered(WorldId neighbour) const;  // of its messages, so many, in order
   // The connection with it was interrupted, or nothing has come for long: asks, and sends again what it has not
   // acknowledged. Harmless likewise.
   void reconnect(WorldId neighbour);

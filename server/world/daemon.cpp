@@ -22,10 +22,11 @@ constexpr auto kStatusEvery = 200ms;
 constexpr auto kStatusAtMost = 5ms;  // while a paced session waits for news of progress
 constexpr auto kIdleBehind = 4ms;    // where viewers are still to be told something
 constexpr auto kIdle = 20ms;         // longest sleep: reports and signals are looked after in between
-// A neighbour that is waited for and silent for that long is asked for what has got lost; then half as often each time,
-// because it may just be at a long step. After a longer silence it is also sent again what it has not acknowledged.
+// A neighbour that is waited for and silent for that long is asked whether something has got lost; then half as often
+// each time, because it may just be at a long step. Where that does not help it is also sent again what it has not
+// acknowledged.
 constexpr auto kPatience = 20ms;
-constexpr auto kLongSilence = 500ms;
+constexpr auto kLongPatience = 500ms;
 constexpr auto kPatienceMost = 4000ms;
 constexpr auto kFlushAtMost = 5s;  // for neighbours that have left already
 constexpr auto kFinishAtMost = 10s;
@@ -73,7 +74,7 @@ void Daemon::open_lines() {
   if (opened_ == all.size()) return;
   const std::span<const WorldId> fresh = std::span(all).subspan(opened_);
   opened_ = all.size();
-  for (const WorldId world : fresh) lines_.at(world) = {Clock::now(), kPatience};
+  for (const WorldId world : fresh) lines_.at(world) = {Clock::now(), kPatience, 0};
   transport_.open(fresh);
 }
 
@@ -179,7 +180,9 @@ bool Daemon::receive_all() {
         spdlog::warn("refused a message of {} bytes from world {}: {} (refusal {})", incoming->bytes.size(),
                      incoming->from, core_->last_refusal(), refusals_);
     } else {
+      // Questions, and what comes early because something is missing before it, are no news.
       Line& from = lines_.at(incoming->from);
+      if (std::exchange(from.delivered, core_->delivered(incoming->from)) == from.delivered) continue;
       from.heard = Clock::now();
       from.patience = kPatience;
     }
@@ -196,8 +199,8 @@ void Daemon::ask_the_silent(Clock::time_point now) {
   for (const WorldId neighbour : core_->waiting_for()) {
     Line& from = lines_.at(neighbour);
     if (now - from.heard < from.patience) continue;
-    spdlog::debug("nothing came from world {} for {:.1f} s; asking again", neighbour, seconds(from.patience));
-    if (from.patience < kLongSilence)
+    spdlog::debug("nothing came from world {} for {:.2f} s; asking it", neighbour, seconds(from.patience));
+    if (from.patience < kLongPatience)
       core_->ask(neighbour);
     else
       core_->reconnect(neighbour);
@@ -320,7 +323,7 @@ void Daemon::idle(Progress progress, Clock::duration at_most) {
 }
 
 Daemon::End Daemon::run() {
-  std::fill(lines_.begin(), lines_.end(), Line{Clock::now(), kPatience});
+  std::fill(lines_.begin(), lines_.end(), Line{Clock::now(), kPatience, 0});
   report_status(wire::STATE_PREPARING, Clock::now());
   while (!stopped_.load()) {
     const auto before = Clock::now();
@@ -333,7 +336,7 @@ Daemon::End Daemon::run() {
       core_->set_limit(limit);
       // Before the start nobody could be silent.
       if (state_ < wire::STATE_RUNNING) {
-        std::fill(lines_.begin(), lines_.end(), Line{before, kPatience});
+        std::fill(lines_.begin(), lines_.end(), Line{before, kPatience, 0});
         report_status(wire::STATE_RUNNING, before);
       }
     }

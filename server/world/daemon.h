@@ -69,8 +69,9 @@ class Daemon {
   using Clock = std::chrono::steady_clock;
   // What is known of a neighbour's silence.
   struct Line {
-    Clock::time_point heard{};   // last message, or last question because none came
-    Clock::duration patience{};  // how long to wait before the next question
+    Clock::time_point heard{};    // last news, or last question because none came
+    Clock::duration patience{};   // how long to wait before the next question
+    std::uint64_t delivered = 0;  // messages, when last heard
   };
 
   bool receive_all();

@@ -15,7 +15,7 @@ namespace {
 constexpr std::chrono::milliseconds kRetryAfter{150};
 // Longest payload that goes as a datagram, bytes. Of UDP's 64 KiB not all, because some of these come at once from
 // several neighbours, and what does not fit into the receiver's socket buffer is lost.
-constexpr std::size_t kDatagram = 32 * 1024;
+constexpr std::size_t kDatagram = 16 * 1024;
 
 }  // namespace
 
@@ -61,13 +61,18 @@ void DdsTransport::open(std::span<const WorldId> neighbours) {
         participant_, dds::border_datagram_topic(me_),
         [this](wire::Border&& sample, const dds::WriterKey&) {
           const WorldId from = sample.from();
-          came(from, std::move(sample));
+          if (from < kMaxWorlds && opened_[from].load())
+            came(from, std::move(sample));
+          else
+            dds::refusals().add("border topic of world " + std::to_string(me_),
+                                "world " + std::to_string(from) + " is no neighbour");
         },
         [this](int change) {
           datagram_writers_ += change;
           inbox_.wake();
         });
   for (const WorldId id : neighbours) {
+    opened_.at(id).store(true);
     Link& link = *links_.emplace_back(std::make_unique<Link>());
     link.id = id;
     link.sample.from(me_);
@@ -97,12 +102,12 @@ DdsTransport::Link* DdsTransport::find(WorldId neighbour) {
 }
 
 void DdsTransport::readers_changed(Link& link, int change) {
+  if (change > 0) link.just_met.store(true);
   const int left = link.readers.fetch_add(change) + change;
   if (change < 0) {
     if (left <= 0) spdlog::info("lost world {}", link.id);
     return;
   }
-  link.just_met.store(true);
   const bool again = link.met_reader.exchange(true);
   if (again) {
     spdlog::info("world {} is back", link.id);
@@ -151,11 +156,7 @@ void DdsTransport::send(WorldId to, std::vector<std::byte> bytes) {
 }
 
 std::optional<Incoming> DdsTransport::receive() {
-  while (auto incoming = inbox_.pop()) {
-    if (find(incoming->from)) return incoming;
-    dds::refusals().add("border topic of world " + std::to_string(me_),
-                        "world " + std::to_string(incoming->from) + " is no neighbour");
-  }
+  if (auto incoming = inbox_.pop()) return incoming;
   if (!any_missed_) return std::nullopt;
   const auto now = Clock::now();
   any_missed_ = false;

@@ -41,7 +41,8 @@ class DdsTransport final : public Transport {
   dds::Participant& participant_;
   const WorldId me_;
   Inbox inbox_;
-  std::atomic<int> datagram_writers_{0};  // that have been met
+  std::vector<std::atomic<bool>> opened_ = std::vector<std::atomic<bool>>(kMaxWorlds);  // by world
+  std::atomic<int> datagram_writers_{0};  // that have been met; also such as are no neighbours
   bool any_missed_ = false;               // some link has missed a message
   std::vector<std::unique_ptr<Link>> links_;
   // Last, so that no handler finds the rest gone.

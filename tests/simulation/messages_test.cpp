@@ -33,7 +33,8 @@ class Messages : public testing::Test {
                        .to_epoch = 1,
                        .sequence = 3,
                        .ack = 2,
-                       .need = true,
+                       .ask = border::Ask::kAgain,
+                       .sent = 9,
                        .upto = 120,
                        .final_step = 119,
                        .durable = 0};
@@ -59,7 +60,8 @@ TEST_F(Messages, ComeBackBitForBit) {
   const Message back = border::decode(bytes, model_);
   EXPECT_EQ(border::encode(back), bytes);
   EXPECT_EQ(back.header.final_step, 119);
-  EXPECT_TRUE(back.header.need);
+  EXPECT_EQ(back.header.ask, border::Ask::kAgain);
+  EXPECT_EQ(back.header.sent, 9u);
   ASSERT_EQ(back.frames.size(), 1u);
   EXPECT_TRUE(same(back.frames[0].set, message_.frames[0].set));
   ASSERT_EQ(back.parts[0].components.size(), 2u);

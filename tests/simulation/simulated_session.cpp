@@ -178,7 +178,7 @@ class Session {
         if (std::exchange(finals_, finals) != finals) stuck_ = 0;
         if (result_.lost == 0 || ++stuck_ > 200) return fail(standstill());
         for (auto& core : cores_)
-          for (const WorldId n : core->waiting_for()) core->reconnect(n);
+          for (const WorldId n : core->waiting_for()) stuck_ > 100 ? core->reconnect(n) : core->ask(n);
         idle_since = now;
       }
     }
