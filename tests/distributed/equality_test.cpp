@@ -2,6 +2,8 @@
 // step. The reference is `--sync single`: one process, no network.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -80,6 +82,7 @@ TEST_P(Equality, AnyNumberOfWorldsGivesTheHashesOfOne) {
   const bool whole_matrix =
       std::string(::testing::UnitTest::GetInstance()->current_test_suite()->name()).starts_with("All");
 
+  std::optional<double> most_anticipated;  // with more worlds than one
   for (const int worlds : c.worlds) {
     const bool most = worlds == c.worlds.back();
     for (const Way& way : kWays) {
@@ -116,13 +119,17 @@ TEST_P(Equality, AnyNumberOfWorldsGivesTheHashesOfOne) {
       if (worlds >= c.crosses_from) {
         EXPECT_GT(stat(path(n + ".json"), "arrived"), 0);
       }
-      if (way.anticipates && worlds >= c.mixes_from && worlds > 1) {
-        EXPECT_GT(stat(path(n + ".json"), "anticipated"), 0);
-      } else if (!way.anticipates) {
-        EXPECT_EQ(stat(path(n + ".json"), "anticipated"), 0);
+      // Worlds that keep pace need not; of several on few cores some lag.
+      const double anticipated = stat(path(n + ".json"), "anticipated");
+      if (!way.anticipates) {
+        EXPECT_EQ(anticipated, 0);
       }
+      if (worlds >= c.mixes_from && worlds > 1) most_anticipated = std::max(most_anticipated.value_or(0), anticipated);
       if (HasFailure()) return;
     }
+  }
+  if (most_anticipated) {
+    EXPECT_GT(*most_anticipated, 0);
   }
 }
 
