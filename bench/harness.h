@@ -17,7 +17,7 @@ struct Options {
   bool quick = false;              // smaller and shorter: to see that it works, not to measure
   int rounds = 0;                  // repetitions; 0: the command's own choice
   std::vector<std::string> cases;  // of `accuracy`; empty: all
-  std::vector<unsigned> worlds;    // of `accuracy`: compare bits on so many worlds instead
+  std::vector<unsigned> worlds;    // of `accuracy`: compare bits on so many worlds instead; of `scaling`: no others
   bool distribution = false;       // of `accuracy`: the error of distribution instead
 };
 

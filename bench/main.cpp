@@ -52,6 +52,10 @@ int main(int argc, char** argv) {
       sub->add_option("--rounds", options.rounds, "repetitions of which the median is taken")
           ->check(CLI::Range(1, 100));
     }
+    if (command.run == soda::bench::scaling)
+      sub->add_option("--worlds", options.worlds,
+                      "strong scaling on so many worlds (several numbers), and nothing else")
+          ->check(CLI::Range(2, 1024));
     sub->add_flag("--quick", options.quick, "small and short: to see that it works, not to measure");
   }
   CLI11_PARSE(app, argc, argv);
