@@ -44,31 +44,29 @@ void MixedIslands::Indexed::sort() {
   touched_by_any.erase(std::unique(touched_by_any.begin(), touched_by_any.end()), touched_by_any.end());
 }
 
-bool MixedIslands::Indexed::has(BodyId body) const {
+std::optional<std::uint32_t> MixedIslands::Indexed::component_of(BodyId body) const {
   const auto at = std::lower_bound(holder.begin(), holder.end(), std::pair(body, 0u));
-  return at != holder.end() && at->first == body;
+  if (at == holder.end() || at->first != body) return std::nullopt;
+  return at->second;
 }
 
 bool MixedIslands::put(Part part) {
   const auto old = parts_.find(part.origin);
+  const Part* const known = old == parts_.end() ? nullptr : &old->second.part;
+  if (known && (part.revision < known->revision || (part.revision == known->revision && known->whole))) return false;
+  const bool more = known && part.revision == known->revision && !part.whole;  // of what is there
   Indexed fresh;
-  Indexed* into = &fresh;
-  if (old != parts_.end()) {
-    const Part& known = old->second.part;
-    if (part.revision < known.revision || (part.revision == known.revision && known.whole)) return false;
-    if (part.revision == known.revision && !part.whole) into = &old->second;
+  Indexed& into = more ? old->second : fresh;
+  auto components = std::exchange(part.components, {});
+  if (more) {
+    std::erase_if(components, [&](const auto& c) { return into.component_of(c->set.bodies.front().id).has_value(); });
+    if (components.empty()) return false;
+  } else {
+    into.part = std::move(part);
   }
-  const auto components = std::exchange(part.components, {});
-  if (into == &fresh) into->part = std::move(part);
-  const std::size_t before = into->part.components.size();
-  for (const auto& component : components) {
-    if (into != &fresh && into->has(component->set.bodies.front().id)) continue;
-    into->add(component);
-    if (into != &fresh) into->sort();
-  }
-  if (into != &fresh && into->part.components.size() == before) return false;
-  into->sort();
-  if (into == &fresh) parts_.insert_or_assign(fresh.part.origin, std::move(fresh));
+  for (auto& component : components) into.add(std::move(component));
+  into.sort();
+  if (!more) parts_.insert_or_assign(fresh.part.origin, std::move(fresh));
   return true;
 }
 
@@ -108,8 +106,8 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
     for (const Port& port : component.ports) {
       const Indexed* part = part_of(port.owner);
       if (!part) continue;
-      const auto holder = std::lower_bound(part->holder.begin(), part->holder.end(), std::pair(port.body, 0u));
-      if (holder == part->holder.end() || holder->first != port.body) {
+      const std::optional<std::uint32_t> holder = part->component_of(port.body);
+      if (!holder) {
         if (!part->part.whole) {  // yet to be passed on
           missing.insert(port.owner);
           continue;
@@ -118,7 +116,7 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
                                ", but its owner " + std::to_string(port.owner) + " does not say so");
         continue;
       }
-      const auto& bodies = part->part.components[holder->second]->set.bodies;
+      const auto& bodies = part->part.components[*holder]->set.bodies;
       const auto body = std::lower_bound(bodies.begin(), bodies.end(), port.body,
                                          [](const BodyState& b, BodyId id) { return b.id < id; });
       if (record_hash(*body) != port.record) {
@@ -126,7 +124,7 @@ MixedIslands::Closure MixedIslands::close(Key from) const {
                                " hold different states of body " + std::to_string(port.body));
         continue;
       }
-      visit({port.owner, holder->second});
+      visit({port.owner, *holder});
     }
     for (const BodyState& body : component.set.bodies) {
       if (!neighbourhood_->is_wide(body)) continue;
@@ -171,10 +169,7 @@ bool MixedIslands::leads_over(const Closure& island, Key component, WorldId betw
   const auto it = parts_.find(between);
   if (it == parts_.end() || !touches(component, between)) return false;
   const Indexed& origin = parts_.at(component.origin);
-  const auto touches_it = [&](const Port& port) {
-    const auto holder = std::lower_bound(origin.holder.begin(), origin.holder.end(), std::pair(port.body, 0u));
-    return holder != origin.holder.end() && holder->first == port.body && holder->second == component.component;
-  };
+  const auto touches_it = [&](const Port& port) { return origin.component_of(port.body) == component.component; };
   for (auto key = std::lower_bound(island.components.begin(), island.components.end(), Key{between, 0});
        key != island.components.end() && key->origin == between; ++key) {
     const std::vector<Port>& ports = it->second.part.components[key->component]->ports;

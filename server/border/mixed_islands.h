@@ -75,7 +75,7 @@ class MixedIslands {
   struct Indexed {
     void add(std::shared_ptr<const Component> component);
     void sort();
-    bool has(BodyId body) const;
+    std::optional<std::uint32_t> component_of(BodyId body) const;
     Part part;
     using InComponent = std::pair<BodyId, std::uint32_t>;
     std::vector<std::uint64_t> hashes;          // by component

@@ -106,9 +106,7 @@ class WorldCore::Impl final : timeline::Arbiter {
     if (action.step <= std::max(closings_.closed(), final_))
       throw ProtocolError("action " + std::to_string(action.number) + " is for step " + std::to_string(action.step) +
                           ", which is closed");
-    if (const auto* spawn = std::get_if<Spawn>(&action.action)) {
-      model_.add(spawn->body);
-    }
+    if (const auto* spawn = std::get_if<Spawn>(&action.action)) model_.add(spawn->body);
     timeline_.act(action);
     settler_.hurry(timeline_.newest());
     ++logged_;
